@@ -1,4 +1,4 @@
-"""Design: evaluations and local searches a second on one core."""
+"""Benchmark of the design solvers: evaluations and local searches per second on one core."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from flarewright.design.benchmark import task_of
-from flarewright.design.ghosts import differentiate, evaluate
-from flarewright.design.polish import polish
-from flarewright.design.search import batch_size
-from flarewright.design.trials import CASES, Trial
+from flarewright.design.problem.ghosts import differentiate, evaluate
+from flarewright.design.solvers.polish import polish
+from flarewright.design.solvers.pool_search import batch_size
+from flarewright.design.thesis.benchmark import task_of
+from flarewright.design.thesis.trials import CASES, Trial
 
 
 def design(seconds: Callable[[Callable[[], Any]], float], row: Callable[..., dict[str, Any]]) -> list[dict[str, Any]]:
-    """Measure both lenses of the thesis."""
+    """Measure both lenses of Walch's thesis."""
     found = []
     for case in CASES:
         task = task_of(Trial("heliar" if case == "heliar" else "canon"))
@@ -31,7 +31,7 @@ def design(seconds: Callable[[Callable[[], Any]], float], row: Callable[..., dic
         starts = known.random_points(np.random.default_rng(0), 4 * count)
         points = [(structure, x) for x in starts]
         polish(problem, points[:1])
-        begun = time.process_time()
+        started = time.process_time()
         polish(problem, points)
-        found.append(row("design", f"{case}: local searches", len(points) / (time.process_time() - begun), "1/s"))
+        found.append(row("design", f"{case}: local searches", len(points) / (time.process_time() - started), "1/s"))
     return found

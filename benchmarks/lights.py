@@ -1,6 +1,6 @@
-"""Lights and surfaces that cost more than a point through spheres: a hundred lights, area lights, figure errors.
+"""Benchmark of expensive lights and surfaces: a hundred lights, area lights, figure errors.
 
-Every row stands as a ratio to the same picture of one distant point, or of the lens as designed.
+Each row has a ratio to the same picture with one distant point light, or of the lens as designed.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ Row = Callable[..., dict[str, Any]]
 Seconds = Callable[[Callable[[], Any]], float]
 
 SIZE_PX = (640, 360)
-"""A quarter of the other frames, so that a part ends within a minute."""
+"""A quarter of the pixels of the other frames, so that each part ends within a minute."""
 
 COUNT = 100
 REACH_DEG = (18.0, 10.0)
-"""Random lights stand within these field angles; a third of them is in the Heliar's picture."""
+"""Largest field angles of the random lights; a third of the lights is in the Heliar's picture."""
 
 SINGLES = 4
-"""So many of them, rendered alone, tell what one costs."""
+"""Number of lights that are rendered alone, to measure the cost of one."""
 
 
 def random_lights(count: int, seed: int = 1) -> tuple[Light, ...]:
-    """Lights of one spectrum at random places, their intensities spread by a factor e."""
+    """Return lights of one spectrum at random positions, with log-normal intensities (log standard deviation 1)."""
     rng = np.random.default_rng(seed)
     angles = rng.uniform([-side for side in REACH_DEG], REACH_DEG, (count, 2))
     powers = np.exp(rng.normal(size=count))
@@ -50,7 +50,7 @@ def _frame(mode: str, lights: tuple[Light, ...], *, starburst: bool = True, lens
 
 
 def lights(seconds: Seconds, row: Row) -> list[dict[str, Any]]:
-    """Time a hundred lights beside one, final and draft, ghosts alone and with starbursts."""
+    """Time a hundred lights against one, final and draft, with and without starbursts."""
     found = []
     many = random_lights(COUNT)
     for mode in ("final", "draft"):
@@ -68,7 +68,7 @@ def lights(seconds: Seconds, row: Row) -> list[dict[str, Any]]:
 
 
 def area(seconds: Seconds, row: Row) -> list[dict[str, Any]]:
-    """Time area lights beside a point."""
+    """Time area lights against a point."""
     found: list[dict[str, Any]] = []
     place = (7.0, 4.0)
     kinds = {
@@ -90,7 +90,7 @@ def area(seconds: Seconds, row: Row) -> list[dict[str, Any]]:
 
 
 def surfaces(seconds: Seconds, row: Row) -> list[dict[str, Any]]:
-    """Time a zoom with decentre, tilt and figure errors on every surface beside the zoom as designed."""
+    """Time a zoom with decentre, tilt and figure errors on every surface against the zoom as designed."""
     found: list[dict[str, Any]] = []
     plain = _frame("final", (Light(field_deg=(10.0, 5.0)),), starburst=False, lens="canon-28-80")
     samples = {

@@ -1,7 +1,7 @@
-"""Every pass that a picture may have, as a ratio to the same picture without it, on a small frame.
+"""Benchmark of every pass of a picture, as a ratio to the same picture without it, on a small frame.
 
-Each picture is drawn once to warm up; after that all are drawn in turns, so that a machine that is busy for a while is
-so for all of them, and the medians are compared.
+Each picture is drawn once to warm up. Then all pictures are drawn in turns, so that other load on the machine affects
+all of them alike, and their medians are compared.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ from flarewright.model import (
     SensorGrating,
     Starburst,
 )
-from flarewright.render.ledger import trace_ledger
-from flarewright.render.prepare import settle
-from flarewright.render.reference import spectral_shots
+from flarewright.render.reference.energy_ledger import trace_ledger
+from flarewright.render.reference.estimator import spectral_shots
 from flarewright.render.render import render
+from flarewright.render.scene.resolve import resolve_project
 
 Row = Callable[..., dict[str, Any]]
 
 PLACE = (10.0, 5.0)
 SLOW = 1.0
-"""Seconds."""
+"""Time of a picture from which on it is drawn only once, seconds."""
 
 POINTS = 16384
-"""Points of the front that the reference picture traces."""
+"""Number of points on the front that the reference picture traces."""
 
 
 def plain() -> Project:
-    """Ghosts of the bare Heliar at f/8, six blades, and nothing else."""
+    """Return a project with the ghosts of the bare Heliar at f/8, six blades, and nothing else."""
     return Project(
         lens="heliar-tronnier",
         f_number=8.0,
@@ -92,19 +92,19 @@ def variants() -> dict[str, Project]:
 
 
 def passes(repeat: int, row: Row) -> list[dict[str, Any]]:
-    """Time each pass beside the picture without it."""
+    """Time each pass against the picture without it."""
     works: dict[str, Callable[[], Any]] = {
         name: (lambda project=project: render(project))  # type: ignore[misc]
         for name, project in variants().items()
     }
-    shots = spectral_shots(settle(plain()), None)
+    shots = spectral_shots(resolve_project(plain()), None)
     works["the ledger"] = lambda: trace_ledger(shots, 0)
     for work in works.values():
         work()
     times: dict[str, list[float]] = {name: [] for name in works}
     for turn in range(repeat):
         for name, work in works.items():
-            # once tells enough of what is that slow
+            # one run is enough for slow pictures
             if turn == 0 or times[name][0] < SLOW:
                 start = time.perf_counter()
                 work()

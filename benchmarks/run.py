@@ -1,10 +1,10 @@
-"""Benchmarks: trace, raster, frame, start-up, memory.
+"""Benchmarks of tracing, rasterization, whole frames, start-up and memory.
 
     python -m benchmarks [--json FILE] [--repeat N] [--only PART ...]
 
-Every number is the median of repeated runs. Machines differ, so each kernel also stands as a ratio to a yardstick taken
-in the same run: a copy of memory for the raster, a plain scalar tracer for the trace. Nothing here is part of the test
-suite, and nothing fails for being slow.
+Every number is the median of repeated runs. Machines differ, so each kernel also has a ratio to a yardstick measured in
+the same run: a copy of memory for the raster, a plain scalar tracer for the trace. The benchmarks are not part of the
+test suite and have no time limits.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from benchmarks.lights import area, lights, surfaces
 from benchmarks.passes import passes
 
 import flarewright
-from flarewright.kernels.raster import blank_plane, fill_polygon
+from flarewright.kernels.raster.polygons import blank_plane, fill_polygon
 from flarewright.model import (
     Art,
     Bare,
@@ -49,21 +49,21 @@ from flarewright.model import (
     Rule,
     Scatter,
 )
-from flarewright.optics.bundle import trace_points
-from flarewright.optics.pack import pack_lens
-from flarewright.optics.paraxial import first_order
-from flarewright.optics.paths import direct_path, ghost_paths
-from flarewright.optics.region import find_region, front_box
-from flarewright.render.montecarlo import HEROES, ray_source, run_batch
-from flarewright.render.opening import make_opening
-from flarewright.render.prepare import build, load_lens, settle
-from flarewright.render.reference import spectral_shots
+from flarewright.optics.lens.paraxial import first_order
+from flarewright.optics.lens.paths import direct_path, ghost_paths
+from flarewright.optics.rays.bundle import trace_points
+from flarewright.optics.rays.pack import pack_lens
+from flarewright.optics.rays.pupil_region import find_region, front_box
+from flarewright.render.reference.batches import HEROES, ray_source, run_batch
+from flarewright.render.reference.estimator import spectral_shots
 from flarewright.render.render import render
-from flarewright.render.shots import make_shots
+from flarewright.render.scene.opening import make_opening
+from flarewright.render.scene.resolve import build, load_lens, resolve_project
+from flarewright.render.scene.shots import make_shots
 
 PARTS = (
     "yardsticks", "trace", "raster", "frame", "passes", "art", "built", "lights", "area", "surfaces", "scatter",
-    "ringing", "reference", "design", "startup", "memory",
+    "ringing", "reference", "design", "residual", "startup", "memory",
 )  # fmt: skip
 
 LIGHT = (10.0, 5.0)
@@ -73,18 +73,18 @@ Rows = list[dict[str, Any]]
 
 
 LONGEST = 6.0
-"""A number is not worth more seconds than these; three runs are always made."""
+"""Time limit per number, seconds; at least three runs are always made."""
 
 
 def median_seconds(work: Callable[[], Any], repeat: int, least: float = 0.0) -> float:
-    """Time some work, once to warm up and then up to `repeat` times; work shorter than `least` is run in batches."""
+    """Time a function, after one warm-up call, up to `repeat` times; calls shorter than `least` run in batches."""
     work()
-    begun = time.perf_counter()
+    started = time.perf_counter()
     work()
-    once = time.perf_counter() - begun
+    once = time.perf_counter() - started
     batch = max(1, int(least / max(once, 1e-9)))
     times = [] if batch > 1 else [once]
-    while len(times) < repeat and (len(times) < 3 or time.perf_counter() - begun < LONGEST):
+    while len(times) < repeat and (len(times) < 3 or time.perf_counter() - started < LONGEST):
         start = time.perf_counter()
         for _ in range(batch):
             work()
@@ -101,7 +101,7 @@ def row(part: str, name: str, value: float, unit: str, ratio: float | None = Non
 
 @numba.njit(error_model="numpy")
 def _scalar_trace(curvature, gap, index, heights):
-    """The plainest tracer: one meridional ray after the other, refraction at spheres, nothing recorded."""
+    """Trace meridional rays one after the other, with refraction at spheres, in plain scalar code."""
     total = 0.0
     for y0 in heights:
         y, z, dy, dz = y0, 0.0, 0.0, 1.0
@@ -145,7 +145,7 @@ def yardsticks(repeat: int) -> tuple[Rows, float, float]:
 def _canon(f_number: float = 2.8) -> tuple[Lens, Any, Any]:
     lens = load_lens("canon-28-80")
     project = Project(lens=lens, f_number=f_number, iris=Iris(blades=6), lights=(Light(field_deg=LIGHT),))
-    settled = settle(project)
+    settled = resolve_project(project)
     return lens, settled, make_shots(settled, make_opening(settled, None))[0]
 
 
@@ -179,7 +179,7 @@ def trace(repeat: int, scalar: float) -> Rows:
 
 
 def raster(repeat: int, bandwidth: float) -> Rows:
-    """Draw triangles of some sizes; a fragment is a pixel of one triangle, three floats read and written."""
+    """Draw triangles of several sizes; a fragment is a pixel of one triangle, with three floats read and written."""
     rng = np.random.default_rng(1)
     found = []
     plane = blank_plane(1280, 720)
@@ -200,7 +200,7 @@ def raster(repeat: int, bandwidth: float) -> Rows:
 
 @numba.njit
 def _draw(corners, rgb, plane):
-    """Draw triangles without a call from Python for each."""
+    """Draw triangles without a Python call for each."""
     for k in range(corners.shape[0]):
         fill_polygon(corners[k], 3, 1.0, 1e-4, 1e-4, 0.0, 2.0, rgb, plane)
 
@@ -211,7 +211,7 @@ def _draw(corners, rgb, plane):
 def canon_frame(
     f_number: float, iris: Iris, *, bridge: bool, size: tuple[int, int] = (1280, 720), ringing: str = "off"
 ) -> Project:
-    """The workload "Canon": 171 ghosts, 3 wavelengths, no starburst, no rings unless asked for."""
+    """Return the workload "Canon": 171 ghosts, 3 wavelengths, no starburst, rings by choice."""
     return Project(
         lens="canon-28-80",
         f_number=f_number,
@@ -234,7 +234,7 @@ def heliar_frame(mode: str, *, starburst: bool, ringing: str = "off") -> Project
 
 
 def frame(repeat: int) -> Rows:
-    """Whole renders, lens loading included, as the command line and the library do them; rings where a row says so."""
+    """Time whole renders, including loading the lens, as the command line and the library run them."""
     found = []
     for label, f_number, iris in (("f/8, six blades", 8.0, Iris(blades=6)), ("wide open", 2.8, Iris())):
         for bridge, ringing in ((False, "off"), (True, "off"), (True, "collins")):
@@ -264,7 +264,7 @@ def frame(repeat: int) -> Rows:
 
 
 def art(repeat: int) -> Rows:
-    """The Heliar's frame with every ghost changed by hand; the first row is the frame without."""
+    """Time the Heliar's frame with a rule that changes every ghost; the first row is the unchanged frame."""
     plain = heliar_frame("final", starburst=False)
     changes: dict[str, dict[str, Any]] = {
         "unchanged": {},
@@ -284,7 +284,7 @@ def art(repeat: int) -> Rows:
 
 
 def built(repeat: int) -> Rows:
-    """The Heliar's frame with what can stand around it, as a ratio to the frame without; and the setting of a zoom."""
+    """Time the Heliar's frame with filters, mirrors and tolerances against the frame without, and setting a zoom."""
     plain = heliar_frame("final", starburst=False)
     glass = Plate(thickness=2.0, gap=1.0, glass="N-BK7")
     mirror = plain.camera.replace(cover_glass=glass, sensor_reflectance=0.05)
@@ -305,14 +305,14 @@ def built(repeat: int) -> Rows:
         ratio = 1e3 * seconds / found[0]["value"] if found else None
         found.append(row("built", f"Heliar final 1280x720, {name}", 1e3 * seconds, "ms", ratio, "as it is"))
     zoom = load_lens("canon-70-200")
-    for name, wish in (("a position", "wide"), ("between two", 110.0)):
-        seconds = median_seconds(lambda wish=wish: build(zoom, zoom=wish), repeat)  # type: ignore[misc]
+    for name, ghost_target in (("a position", "wide"), ("between two", 110.0)):
+        seconds = median_seconds(lambda ghost_target=ghost_target: build(zoom, zoom=ghost_target), repeat)  # type: ignore[misc]
         found.append(row("built", f"zoom of 33 surfaces set to {name}", 1e3 * seconds, "ms"))
     return found
 
 
 def scatter(repeat: int) -> Rows:
-    """Drafts with and without the scatter layer, and that layer's part of it by model."""
+    """Time drafts with and without the scatter layer, by scatter model."""
     found: Rows = []
     for name in ("heliar-tronnier", "canon-28-80"):
         plain = heliar_frame("draft", starburst=False).replace(lens=name)
@@ -324,7 +324,7 @@ def scatter(repeat: int) -> Rows:
 
 
 def ringing(repeat: int) -> Rows:
-    """The Heliar's frame at f/16 with rings inside its ghosts; the first row is the frame without."""
+    """Time the Heliar's frame at f/16 with rings inside its ghosts; the first row has no rings."""
     plain = heliar_frame("final", starburst=False).replace(f_number=16.0, iris=Iris(blades=8))
     found: Rows = []
     for mode, diameter in (("off", 0.0), ("collins", 0.0), ("collins", 0.53), ("frft", 0.0)):
@@ -338,11 +338,11 @@ def ringing(repeat: int) -> Rows:
 
 
 def reference(repeat: int) -> Rows:
-    """Random rays through the whole lens on one thread, with and without a picture; what four reflections cost."""
+    """Time random rays through the whole lens on one thread, with and without a picture, and four reflections."""
     found = []
     for name in ("heliar-tronnier", "canon-28-80"):
         project = Project(lens=name, lights=(Light(field_deg=LIGHT),), quality=Quality(mode="reference"))
-        shots = spectral_shots(settle(project), None)
+        shots = spectral_shots(resolve_project(project), None)
         side = 64
         sources = [ray_source(shot, 0, side=side, light=k) for k, shot in enumerate(shots)]
         for picture in (False, True):
@@ -370,7 +370,7 @@ def reference(repeat: int) -> Rows:
 
 def _run(arguments: list[str], cache: str | None = None) -> float:
     environment = dict(os.environ)
-    # a program that pip has installed keeps its byte code
+    # an installed program keeps its byte code
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     if cache is not None:
         environment["NUMBA_CACHE_DIR"] = cache
@@ -380,7 +380,7 @@ def _run(arguments: list[str], cache: str | None = None) -> float:
 
 
 def startup(repeat: int) -> Rows:
-    """Wall time of commands: with nothing compiled, and with everything compiled."""
+    """Time commands with nothing compiled and with everything compiled (wall time)."""
     python = sys.executable
     command = [python, "-m", "flarewright"] if _has_main() else [str(Path(python).parent / "flarewright")]
     found = []
@@ -408,6 +408,14 @@ def startup(repeat: int) -> Rows:
     return found
 
 
+def residual() -> Rows:
+    """Measure what each layer of the residual of measured flare is worth in a replay."""
+    # it needs the synthetic camera of the tests
+    from benchmarks.measure.ablation import ablation_rows
+
+    return ablation_rows(row)
+
+
 def _has_main() -> bool:
     return (Path(flarewright.__file__).parent / "__main__.py").exists()
 
@@ -428,7 +436,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 
 def memory() -> Rows:
-    """Peak resident memory of a process that renders one frame at 1920x1080."""
+    """Measure the peak resident memory of a process that renders one frame at 1920x1080."""
     found = []
     root = str(Path(__file__).parents[1])
     for which in ("canon", "heliar"):
@@ -453,7 +461,7 @@ def facts() -> dict[str, Any]:
 
 
 def show(rows: Rows) -> None:
-    """Print a table of what was measured."""
+    """Print a table of the results."""
     width = max(len(r["name"]) for r in rows)
     part = ""
     for r in rows:
@@ -465,39 +473,40 @@ def show(rows: Rows) -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run what was asked for, print it, and write it as JSON on request."""
+    """Run the chosen parts, print the results, and write them as JSON if requested."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Flarewright's benchmarks.")
-    parser.add_argument("--json", metavar="FILE", help="also write the numbers to this file")
-    parser.add_argument("--repeat", type=int, default=5, help="runs per number; the median counts (5)")
-    parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS, help="parts to run")
-    asked = parser.parse_args(arguments)
+    parser.add_argument("--json", metavar="FILE", help="write the numbers to this file")
+    parser.add_argument("--repeat", type=int, default=5, help="runs per number; the median is printed (default: 5)")
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS, help="parts to run (default: all)")
+    given = parser.parse_args(arguments)
     machine = facts()
     print("  ".join(f"{key} {value}" for key, value in machine.items()))
-    rows, bandwidth, scalar = yardsticks(asked.repeat)
+    rows, bandwidth, scalar = yardsticks(given.repeat)
     parts: dict[str, Callable[[], Rows]] = {
         "yardsticks": list,
-        "trace": lambda: trace(asked.repeat, scalar),
-        "raster": lambda: raster(asked.repeat, bandwidth),
-        "frame": lambda: frame(asked.repeat),
-        "passes": lambda: passes(asked.repeat, row),
-        "art": lambda: art(asked.repeat),
-        "built": lambda: built(asked.repeat),
-        "lights": lambda: lights(lambda work: median_seconds(work, asked.repeat), row),
-        "area": lambda: area(lambda work: median_seconds(work, asked.repeat), row),
-        "surfaces": lambda: surfaces(lambda work: median_seconds(work, asked.repeat), row),
-        "scatter": lambda: scatter(asked.repeat),
-        "ringing": lambda: ringing(asked.repeat),
-        "reference": lambda: reference(asked.repeat),
-        "design": lambda: design(lambda work: median_seconds(work, asked.repeat, 0.2), row),
-        "startup": lambda: startup(asked.repeat),
+        "trace": lambda: trace(given.repeat, scalar),
+        "raster": lambda: raster(given.repeat, bandwidth),
+        "frame": lambda: frame(given.repeat),
+        "passes": lambda: passes(given.repeat, row),
+        "art": lambda: art(given.repeat),
+        "built": lambda: built(given.repeat),
+        "lights": lambda: lights(lambda work: median_seconds(work, given.repeat), row),
+        "area": lambda: area(lambda work: median_seconds(work, given.repeat), row),
+        "surfaces": lambda: surfaces(lambda work: median_seconds(work, given.repeat), row),
+        "scatter": lambda: scatter(given.repeat),
+        "ringing": lambda: ringing(given.repeat),
+        "reference": lambda: reference(given.repeat),
+        "design": lambda: design(lambda work: median_seconds(work, given.repeat, 0.2), row),
+        "residual": residual,
+        "startup": lambda: startup(given.repeat),
         "memory": memory,
     }
     for part in PARTS:
-        if part in asked.only:
+        if part in given.only:
             rows += parts[part]()
     show(rows)
-    if asked.json:
-        Path(asked.json).write_text(
+    if given.json:
+        Path(given.json).write_text(
             json.dumps({"machine": machine, "results": rows}, indent=2) + "\n", encoding="utf-8"
         )
 

@@ -1,4 +1,4 @@
-"""Render one shot through the same lens with different coatings, and tell how much ghost light each leaves.
+"""Render one shot through the same lens with different coatings, and print the ghost light of each.
 
 Usage: python compare_coatings.py [FOLDER]
 """

@@ -1,7 +1,7 @@
-"""Render one shot in reference and in final quality, and see whether they differ by more than chance.
+"""Render one shot in reference and in final quality, and test whether they differ by more than chance.
 
 Writes judged.png: the reference, the final picture, and their difference in standard errors: red where final quality is
-brighter, blue where the reference is, grey where too few rays fell to tell.
+brighter, blue where the reference is, grey where too few rays fell for a comparison.
 
 Usage: python judge_a_render.py [FOLDER]
 """
@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 import flarewright as fw
-from flarewright.render.display import auto_exposure, view
+from flarewright.render.image.display import auto_exposure, view
 
 
 def main(folder: Path, size: tuple[int, int] = (160, 90), error: float = 0.02) -> None:
@@ -38,12 +38,12 @@ def main(folder: Path, size: tuple[int, int] = (160, 90), error: float = 0.02) -
     x, y, w, h = ghosts.window
     drawn[y : y + h, x : x + w] = ghosts.pixels
 
-    # green is nearest to what the eye calls bright
-    lit = variance[..., 1] > 0.0
+    # green is closest to perceived brightness
+    sampled = variance[..., 1] > 0.0
     z = np.zeros(mean.shape[:2])
-    z[lit] = (drawn - mean)[lit, 1] / np.sqrt(variance[lit, 1])
-    # an error is worth something where many rays fell
-    known = lit & (np.sqrt(variance[..., 1]) < 0.3 * np.minimum(mean, drawn)[..., 1])
+    z[sampled] = (drawn - mean)[sampled, 1] / np.sqrt(variance[sampled, 1])
+    # the error is reliable where many rays fell
+    known = sampled & (np.sqrt(variance[..., 1]) < 0.3 * np.minimum(mean, drawn)[..., 1])
     rms = np.sqrt((z[known] ** 2).mean())
     print(f"{known.mean():.0%} of the pixels are known to 30 %; there the two differ by rms {rms:.2f} standard errors")
     print(f"all ghosts, final over reference: {drawn[..., 1].sum() / mean[..., 1].sum() - 1.0:+.2%}")

@@ -1,4 +1,4 @@
-"""Render one layer a ghost and add them back: light adds, so nothing but rounding is left over.
+"""Render one layer per ghost and add them: light adds, so the difference is rounding only.
 
 Usage: python layers_add_up.py [FOLDER]
 """
@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import flarewright as fw
-from flarewright.render.compose import beauty
+from flarewright.render.image.compose import beauty
 
 
 def main(folder: Path) -> None:

@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 import flarewright as fw
-from flarewright.io.lens_writer import write_lens
+from flarewright.io.lens.lens_writer import write_lens
 
 CROWN = fw.Medium(glass="N-BK7", n_d=1.5168, v_d=64.17)
 FLINT = fw.Medium(glass="N-SF5", n_d=1.6727, v_d=32.25)

@@ -1,4 +1,4 @@
-"""Render a sequence: a light crosses the picture, one EXR a frame.
+"""Render a sequence: a light crosses the picture, one EXR per frame.
 
 Usage: python moving_light.py [FOLDER]
 """

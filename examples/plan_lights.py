@@ -7,10 +7,10 @@ from functools import partial
 
 import numpy as np
 
-from flarewright.cli.predict_flares import scene_flare
-from flarewright.model.scene import Scene
+from flarewright.model.project.scene import Scene
 from flarewright.predict.plan import plan_scene, ranking
-from flarewright.predict.switching import shots_of
+from flarewright.predict.switching import choose_cameras
+from flarewright.workflow.lens_flares import scene_flare
 
 SCENE = {
     "luminance_cd_m2": (1.0, 500.0),
@@ -40,7 +40,7 @@ def main() -> None:
         camera, light = scene.cameras[one.camera].name, scene.lights[one.light].name
         print(f"{light} in {camera}: mean veil {one.mean_veil_cd_m2:.3g} cd/m2, worst {one.worst_veil_cd_m2:.3g}")
     veils = [plan.veil(camera) for camera in range(len(scene.cameras))]
-    for shot in shots_of(np.array(veils), plan.times_s, 0.0):
+    for shot in choose_cameras(np.array(veils), plan.times_s, 0.0):
         first, until = plan.times_s[shot.first], plan.times_s[shot.until]
         print(f"{first:g} to {until:g} s: {scene.cameras[shot.camera].name}")
 

@@ -1,5 +1,6 @@
-"""Common ground of all tests: helpers importable by name, and one cache of compiled kernels that fits the sources."""
+"""Setup of all tests: helper modules importable by name, and a cache of compiled kernels for the current sources."""
 
+import gc
 import hashlib
 import os
 import sys
@@ -11,21 +12,26 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE / part) for part in ("physics", "design", "measure", "predict")]
+# helpers lie beside the tests of their folder; module names are unique
+sys.path[:0] = sorted({str(path.parent) for path in HERE.rglob("*.py")} - {str(HERE)})
+# what judges a fit is in benchmarks/
+sys.path.append(str(HERE.parent))
 
-# Numba notices a changed kernel but not a changed kernel that it calls, so the cache is named after all their sources
+# Numba notices a changed kernel but not a changed callee, so the name of the cache folder is a digest of all kernels
 _sources = sorted((HERE.parent / "src" / "flarewright" / "kernels").rglob("*.py"))
 _digest = hashlib.sha256(b"".join(path.read_bytes() for path in _sources)).hexdigest()[:16]
 os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(tempfile.gettempdir()) / f"flarewright-kernels-{_digest}"))
-# as for the command line: the program's own threads share the work, and others beside them would spin
+# as on the command line: the program shares its work among its threads, and BLAS threads would only spin beside them
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# what a command lacks is compiled by the test's process, once for all; tests/contracts has helpers (docs/adr/0007)
+# as on the command line: the imported modules live until the end
+gc.set_threshold(100_000)
+# the test process compiles missing kernels itself, without helpers; tests/contracts tests the helpers (docs/adr/0007)
 os.environ.setdefault("FLAREWRIGHT_HELPER", "1")
 
 
 @contextmanager
 def _locked(path):
-    """Hold a file's lock, which ends with the process at the latest; where the system has none, hold nothing."""
+    """Hold a file lock, which the system releases when the process ends; without `fcntl` hold none."""
     try:
         import fcntl
     except ImportError:
@@ -37,21 +43,23 @@ def _locked(path):
 
 
 def pytest_configure(config):
-    """Have each kernel compiled by one process; the others wait for it and load its machine code.
+    """Let one process compile each kernel; the others wait for it and load its machine code.
 
-    Numba also reads, changes and writes the index of a kernel without a lock, so that two processes that compile the
-    same kernel for other types can lose each other's code.
+    Numba reads, changes and writes a kernel's cache index without a lock: two processes that compile the same kernel
+    for different types can lose each other's code.
     """
     if config.getoption("numprocesses", default=None) and not hasattr(config, "workerinput"):
-        # the process that only hands out tests compiles nothing
+        # the controller process of pytest-xdist compiles nothing
         return
     from numba.core.dispatcher import Dispatcher
 
-    compile_alone = Dispatcher.compile
+    from flarewright.kernels.jit.warmup import without_garbage_collection
+
+    compile_alone = without_garbage_collection()(Dispatcher.compile)
 
     def compile_once(self, sig):
         if self._cache.cache_path is None:
-            # nothing of it is cached: its callers hold its code
+            # an inner kernel: not cached, its code is in its callers
             return compile_alone(self, sig)
         index = Path(self._cache._cache_file._index_path)
         index.parent.mkdir(parents=True, exist_ok=True)
@@ -61,11 +69,16 @@ def pytest_configure(config):
     Dispatcher.compile = compile_once
 
 
+def pytest_collection_finish():
+    """Exclude the collected tests from garbage collection, at the end of the process as well: they stay until then."""
+    gc.freeze()
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _one_tree_of_commands():
-    """Keep the commands that Typer builds at every call: building them costs more than most commands of the tests do.
+    """Cache the command tree that Typer builds at every call: building it takes longer than most tested commands.
 
-    Tests that start a process, as `test_the_package_runs_as_a_module`, build the tree as a user's process does.
+    Tests that start a process, such as `test_the_package_runs_as_a_module`, build the tree as a user's process does.
     """
     import typer.main
 

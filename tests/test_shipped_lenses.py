@@ -1,4 +1,4 @@
-"""The shipped prescriptions, checked by a small tracer of their own: plain Python, nothing of Flarewright's optics."""
+"""The shipped prescriptions, checked by a small separate tracer in plain Python, without Flarewright's optics."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from flarewright.io.lens_file import read_lens_toml
+from flarewright.io.lens.toml_lens import read_lens_toml
 
 FOLDER = Path(__file__).parents[1] / "src" / "flarewright" / "lenses"
 FILES = sorted(FOLDER.glob("*.toml"))
 NAMES = [file.stem for file in FILES]
 
-# efl and bfl at n_d of physics.md, as many digits as it states; None: it states none.
+# efl and bfl at n_d from physics.md, with its number of digits; None: not stated there
 KNOWN = {
     "heliar-tronnier": (99.235796, 81.315056, 1e-6),
     "canon-28-80": (35.8423, 38.3787, 1e-4),
@@ -41,23 +41,23 @@ KINDS = {
 
 
 def load(name: str) -> dict[str, Any]:
-    """Parse a shipped file, no more."""
+    """Parse a shipped file without checks."""
     with open(FOLDER / f"{name}.toml", "rb") as stream:
         return tomllib.load(stream)
 
 
 def is_stop(row: dict[str, Any]) -> bool:
-    """Tell whether the row is the stop."""
+    """Return whether the row is the stop."""
     return bool(row.get("stop", False))
 
 
 def curvature(row: dict[str, Any]) -> float:
-    """Curvature of a row; the stop and flats have 0."""
+    """Return the curvature of a row; 0 for the stop and flat surfaces."""
     return 0.0 if is_stop(row) or row["radius"] == "flat" else 1.0 / row["radius"]
 
 
 def focal_lengths(rows: list[dict[str, Any]]) -> tuple[float, float]:
-    """Effective and back focal length by a paraxial ray from infinity."""
+    """Return effective and back focal length from a paraxial ray from infinity."""
     y, u, n = 1.0, 0.0, 1.0
     for k, row in enumerate(rows):
         behind = n if is_stop(row) else row.get("n_d", 1.0)
@@ -69,10 +69,10 @@ def focal_lengths(rows: list[dict[str, Any]]) -> tuple[float, float]:
 
 
 def heights_on_axis(rows: list[dict[str, Any]], height: float) -> tuple[list[float], float]:
-    """Height at every row of an exact meridional ray parallel to the axis, and where it crosses the axis."""
+    """Return the heights of an exact meridional ray parallel to the axis at every row, and its axial crossing."""
     y, sine, n = height, 0.0, 1.0  # sine of the ray's angle to the axis, positive upwards
     heights = []
-    sag = 0.0  # the ray's point lies so far behind the vertex of the row it is on
+    sag = 0.0  # distance of the ray's point behind the vertex of its row
     for k, row in enumerate(rows):
         c = curvature(row)
         cosine = math.sqrt(1.0 - sine * sine)
@@ -80,7 +80,7 @@ def heights_on_axis(rows: list[dict[str, Any]], height: float) -> tuple[list[flo
             to_plane = (rows[k - 1]["thickness"] - sag) / cosine
             y += to_plane * sine
             sag = 0.0
-        # exact distance from the vertex plane to the sphere, in the form that stays true for c = 0
+        # exact distance from the vertex plane to the sphere, in a form that is valid for c = 0
         a = c * y * y
         b = cosine - c * y * sine
         step = a / (b + math.sqrt(b * b - c * a)) if c else 0.0
@@ -96,7 +96,7 @@ def heights_on_axis(rows: list[dict[str, Any]], height: float) -> tuple[list[flo
 
 
 def test_at_least_twelve_lenses_ship() -> None:
-    """The issue asks for twelve; each file's name is lower case and free of spaces."""
+    """At least twelve; each file name is in lower case without spaces."""
     assert len(FILES) >= 14
     assert set(KNOWN) | KINDS <= set(NAMES)
     assert all(name == name.lower() and " " not in name for name in NAMES)
@@ -104,7 +104,7 @@ def test_at_least_twelve_lenses_ship() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_focal_length_is_the_stated_one(name: str) -> None:
-    """Within one per cent, by this file's own trace."""
+    """Within 1 %, by this file's trace."""
     lens = load(name)
     efl, bfl = focal_lengths(lens["rows"])
     assert efl == pytest.approx(lens["stated_focal_length"], rel=0.01)
@@ -113,7 +113,7 @@ def test_focal_length_is_the_stated_one(name: str) -> None:
 
 @pytest.mark.parametrize("name", KNOWN)
 def test_check_values_of_the_physics_page(name: str) -> None:
-    """The figures that the project's physics page states."""
+    """The numbers on the project's physics page."""
     efl, bfl, digits = KNOWN[name]
     found = focal_lengths(load(name)["rows"])
     assert found[0] == pytest.approx(efl, abs=digits)
@@ -131,7 +131,7 @@ def test_a_source_is_named(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_reader_accepts_it(name: str) -> None:
-    """No problem, the same rows, and nothing of the file lost."""
+    """No problems, the same rows, and nothing of the file lost."""
     table = load(name)
     lens = read_lens_toml(FOLDER / f"{name}.toml").lens
     assert len(lens.rows) == len(table["rows"])
@@ -143,7 +143,7 @@ def test_the_reader_accepts_it(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_presets_leave_cemented_surfaces_bare(name: str) -> None:
-    """One entry a row; the thesis' preset coats every row and is taken as it stands."""
+    """One entry per row; the thesis' preset coats every row and is kept unchanged."""
     table = load(name)
     rows = table["rows"]
     for preset, coatings in table.get("coating_presets", {}).items():
@@ -151,7 +151,7 @@ def test_presets_leave_cemented_surfaces_bare(name: str) -> None:
         if preset == "thesis":
             continue
         if preset == "period" and name in ("biotar-50-f1.4", "speed-panchro-50"):
-            # from before coatings
+            # older than coatings
             assert set(coatings) == {"none"}
             continue
         before = False
@@ -170,13 +170,13 @@ def test_light_at_full_aperture_reaches_a_focus(name: str) -> None:
     heights, crossing = heights_on_axis(rows, efl / (2.0 * lens["f_number"]))
     for k, (row, height) in enumerate(zip(rows, heights, strict=True)):
         assert height <= row.get("semi_diameter", math.inf), f"row {k}"
-    # the Nikon's table is a published one without the aspheric terms that the zoom needs wide open
+    # the Nikon's table is published without the aspheric terms that the zoom needs wide open
     assert abs(crossing - bfl) < (0.1 if name == "nikon-28-75" else 0.01) * efl
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_neighbouring_surfaces_do_not_cross_within_their_clear_radii(name: str) -> None:
-    """Where both clear radii are given, glass and air are at least nothing thick at the smaller of them."""
+    """Where both clear radii are given, glass and air have no negative thickness at the smaller of them."""
     rows = load(name)["rows"]
     for k, (front, back) in enumerate(pairwise(rows)):
         if "semi_diameter" not in front or "semi_diameter" not in back:
@@ -188,7 +188,7 @@ def test_neighbouring_surfaces_do_not_cross_within_their_clear_radii(name: str) 
 
 @pytest.mark.parametrize("name", GHOSTS)
 def test_ghost_counts(name: str) -> None:
-    """Two-reflection paths, all and same side of the stop, follow from the rows."""
+    """Two-reflection paths, all and on the same side of the stop, follow from the rows."""
     rows = load(name)["rows"]
     stop = next(k for k, row in enumerate(rows) if is_stop(row))
     front, rear = stop, len(rows) - 1 - stop
@@ -197,7 +197,7 @@ def test_ghost_counts(name: str) -> None:
 
 
 def test_both_ends_of_the_zoom_have_the_same_glass() -> None:
-    """Only the gaps between the groups differ, and the image stays where it is."""
+    """Only the gaps between the groups differ, and the image stays in place."""
     wide, tele = load("canon-70-200-wide")["rows"], load("canon-70-200-tele")["rows"]
     differ = [k for k, (one, other) in enumerate(zip(wide, tele, strict=True)) if one != other]
     assert len(differ) == 4
@@ -211,7 +211,7 @@ def test_both_ends_of_the_zoom_have_the_same_glass() -> None:
 
 
 def test_the_heliar_is_the_one_of_the_thesis() -> None:
-    """Stop is row 5, row 6 is flat, and the preset has the nine centre wavelengths."""
+    """The stop is row 5, row 6 is flat, and the preset has the nine centre wavelengths."""
     lens = load("heliar-tronnier")
     assert is_stop(lens["rows"][5])
     assert lens["rows"][6]["radius"] == "flat"

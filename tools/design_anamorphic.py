@@ -1,17 +1,16 @@
 """Design the adapter of `lenses/anamorphic-heliar-2x.toml`: two doublets of cylinders, afocal, in front of the Heliar.
 
-Thin lenses give the start: a front doublet of focal length -F / 2 and a rear one of F, each corrected for colour. Then
-the six radii across and the gap between the doublets are chosen by least squares, so that in the x-z plane the focal
-length is half of that along y, both foci fall together, rays at four angles and three wavelengths meet, and the streak
-is even.
+Thin lenses give the start: a front doublet of focal length -F / 2 and a rear one of F, each achromatic. Then least
+squares determine the six radii across and the gap between the doublets, so that in the x-z plane the focal length is
+half of that along y, both foci coincide, rays at four angles and three wavelengths meet, and the streak is uniform.
 
-Every two of the four faces between glass and air make a streak on the line through the light. To first order light that
-enters at the height h across lands at S00 h, so per mm of a streak there is the more light the smaller S00 is. The two
-faces that look at each other make the one that is wanted: it is longer than the picture is wide, and even where the
-five others, which end within the picture, are faint beside it.
+Each pair of the four faces between glass and air makes a streak on the line through the light. To first order, light
+that enters at the height h across lands at S00 h, so the light per mm of a streak grows as S00 falls. The two faces
+that face each other make the wanted streak: it is longer than the picture is wide, and uniform where the five others,
+which end within the picture, are much fainter.
 
-Prints the radii, rounded, the gap, the misses in micrometres before rounding, and of each pair of faces its light per
-mm over that of the wanted one and its length at f/8. Needs SciPy: `python tools/design_anamorphic.py`.
+Prints the radii, rounded, the gap, the residuals in micrometres before rounding, and for each pair of faces its light
+per mm over that of the wanted one and its length at f/8. Needs SciPy: `python tools/design_anamorphic.py`.
 """
 
 from __future__ import annotations
@@ -19,13 +18,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import brentq, least_squares
 
-from flarewright.io.media import attach
+from flarewright.io.lens.media import attach
 from flarewright.model import Lens, Surface
-from flarewright.optics.paraxial import D_LINE_NM, FirstOrder, first_order, path_matrices
-from flarewright.optics.paths import ghost_path
-from flarewright.optics.shape import transposed
-from flarewright.optics.trace import trace_polylines
-from flarewright.render.prepare import load_lens
+from flarewright.optics.lens.paraxial import D_LINE_NM, FirstOrder, first_order, path_matrices
+from flarewright.optics.lens.paths import ghost_path
+from flarewright.optics.lens.surface_shape import transposed
+from flarewright.optics.rays.single_rays import trace_polylines
+from flarewright.render.scene.resolve import load_lens
 
 REAR_MM = 100.0
 FRONT_MM = -REAR_MM / 2.0
@@ -35,11 +34,11 @@ ANGLES = (0.0, 5.0, 10.0, 14.0)
 WAVELENGTHS_NM = {587.56: 1.0, 486.1: 0.5, 656.3: 0.5}
 PUPIL = np.array([-0.8, -0.4, 0.0, 0.4, 0.8])
 PER_MM = 4.0
-# faces between glass and air, in pairs: the wanted streak's first
+# pairs of faces between glass and air, that of the wanted streak first
 WANTED, OTHERS = (3, 2), ((2, 0), (3, 0), (5, 0), (5, 2), (5, 3))
-# how much the others' light per mm of the sensor counts
+# weight of the other streaks' light per mm of the sensor
 EVEN = 0.3
-# the most curved face must still pass the beam, whose half width is 23 mm
+# the most curved face must pass the beam, whose half width is 23 mm
 LEAST_RADIUS_MM = 36.0
 BASE = load_lens("heliar-tronnier")
 OWN = first_order(BASE)
@@ -71,7 +70,7 @@ def start() -> np.ndarray:
 
 
 def misses(values: np.ndarray) -> np.ndarray:
-    """Return how far focal length and focus are off, rays land beside their chief ray, and the streak is uneven."""
+    """Return the residuals: focal length, focus, rays relative to their chief ray, and non-uniformity of the streak."""
     lens = adapter(values)
     order = first_order(lens)
     assert order.efl_x is not None
@@ -99,7 +98,7 @@ def misses(values: np.ndarray) -> np.ndarray:
 
 
 def streak(lens: Lens, order: FirstOrder, pair: tuple[int, int]) -> tuple[float, float]:
-    """Return across S00 of a ghost and its height on the sensor over that in the stop."""
+    """Return S00 across of a ghost, and its height on the sensor over that in the stop."""
     sensor_z = sum(row.thickness for row in lens.rows[:-1]) + order.sensor_distance
     (*_, to_stop), total = path_matrices(lens, ghost_path(lens, *pair), D_LINE_NM, sensor_z, across=True)
     return float(total[0, 0]), float(total[0, 0] / to_stop[0, 0])
@@ -112,7 +111,7 @@ def _apart(radii: np.ndarray, gap: float) -> float:
 
 
 def main() -> None:
-    """Design it and tell."""
+    """Run the design and print the result."""
     scale = np.abs(start())
     solved = least_squares(lambda x: misses(x * scale), start() / scale, diff_step=1e-4, max_nfev=100)
     values = solved.x * scale

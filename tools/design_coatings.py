@@ -1,9 +1,9 @@
-"""Design the "modern broadband" coating: five films whose thicknesses follow the index of the glass.
+"""Design the "modern broadband" coating: five films with thicknesses for each index of the glass.
 
-Prints the table of `optics/standard_coatings.py`. For each index of the glass the thicknesses minimise the root mean
-square of R at 0, 20 and 35 degrees, because a ghost's light goes with R squared; over wavelengths, half the weight lies
-evenly between 420 and 680 nm and half follows the eye. The search walks from one glass to the next, each starting from
-the thicknesses of the one before, so that the table is smooth and may be interpolated. Needs SciPy:
+Prints the table of `optics/coatings/presets.py`. For each index of the glass the thicknesses minimise the root mean
+square of R at 0, 20 and 35 degrees, because a ghost's light is proportional to R squared; half the weight over
+wavelength is uniform between 420 and 680 nm and half follows the eye's sensitivity. Each glass starts from the
+thicknesses of the previous one, so that the table is smooth and can be interpolated. Needs SciPy:
 `python tools/design_coatings.py`.
 """
 
@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize
 
-from flarewright.optics.cie1931 import cie_1931
-from flarewright.optics.coatings import stack_reflectance
-from flarewright.optics.standard_coatings import BROADBAND_GLASS, BROADBAND_INDICES
+from flarewright.optics.coatings.presets import BROADBAND_GLASS, BROADBAND_INDICES
+from flarewright.optics.coatings.thin_film import stack_reflectance
+from flarewright.optics.colour.cie1931 import cie_1931
 
 WAVELENGTHS_NM = np.linspace(420.0, 680.0, 66)[:, None]
 COSINES = np.cos(np.radians([0.0, 20.0, 35.0]))
@@ -30,7 +30,7 @@ def reflectance(glass: float, thicknesses_nm: np.ndarray) -> np.ndarray:
 
 
 def refine(glass: float, start_nm: np.ndarray) -> np.ndarray:
-    """Minimise the root mean square of R near a start; films thinner than 5 nm are not made."""
+    """Minimise the root mean square of R near a start; films have at least 5 nm."""
     bounds = [(5.0, 300.0)] * len(start_nm)
 
     def merit(thicknesses_nm: np.ndarray) -> float:
@@ -42,7 +42,7 @@ def refine(glass: float, start_nm: np.ndarray) -> np.ndarray:
 
 
 def main() -> None:
-    """Walk over the glasses from the middle outwards and print the table in tenths of a nanometre."""
+    """Optimize the glasses from the middle outwards and print the table in tenths of a nanometre."""
     found: dict[float, np.ndarray] = {}
     middle = min(range(len(BROADBAND_GLASS)), key=lambda k: abs(BROADBAND_GLASS[k] - START_AT))
     for walk in (range(middle, len(BROADBAND_GLASS)), range(middle, -1, -1)):

@@ -1,6 +1,7 @@
-"""Make the pictures of docs/editor.md: `python tools/editor_pictures.py [FOLDER [MODEL]]`.
+"""Take the screenshots of docs/editor.md: `python tools/editor_pictures.py [FOLDER [MODEL]]`.
 
-With a ghost model the picture of a measured flare alone, for no model ships. Needs the extra e2e and Chromium.
+With a ghost model, take only the screenshot of a measured flare, because no model ships. Needs the extra e2e and
+Chromium.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ def shoot(tab: Tab, path: Path) -> None:
 
 
 def path(tab: Tab, folder: Path) -> None:
-    """Key a path and play it; afterwards all is as it was."""
+    """Animate a light, play it, and restore the state."""
     for at, place in (("0", None), ("1.5", (0.35, 0.3)), ("3", (0.2, 0.8))):
         tab.page.fill("input[name=path_time]", at)
         tab.page.press("input[name=path_time]", "Enter")
@@ -51,7 +52,7 @@ def path(tab: Tab, folder: Path) -> None:
 
 
 def panels(tab: Tab, folder: Path) -> None:
-    """Visit every panel once, as a person would who tries the program."""
+    """Open every panel once and use it."""
     shoot(tab, folder / "editor-light.jpg")
     path(tab, folder)
     tab.page.mouse.click(*tab.at(0.62, 0.6))
@@ -70,13 +71,13 @@ def panels(tab: Tab, folder: Path) -> None:
     tab.rest()
     shoot(tab, folder / "editor-iris.jpg")
     tab.tab("coating")
-    tab.js("flarewright.choose('8-6')")
+    tab.js("flarewright.choose('3-1')")
     tab.until("document.querySelector('.map img').naturalWidth > 0 && document.querySelector('.plot svg')")
     tab.rest()
     shoot(tab, folder / "editor-coating.jpg")
     tab.tab("target")
     tab.until("flarewright.view.places.length > 0")
-    tab.js("flarewright.deed('set_wish', {ghost: '8-6', values: {move_mm: 3.5, height: 0.6}})")
+    tab.js("flarewright.command('set_ghost_target', {ghost: '3-1', values: {move_mm: 2.0, height: 0.6}})")
     tab.rest()
     tab.page.click("[data-compare=wipe]")
     tab.until("flarewright.view.target")
@@ -86,11 +87,11 @@ def panels(tab: Tab, folder: Path) -> None:
     tab.until("flarewright.state.solve.running")
     tab.until("!flarewright.state.solve.running")
     tab.until("[...document.querySelectorAll('.candidates img')].every(i => i.naturalWidth > 0)")
-    # the lenses that were found stand below what was asked for
+    # the designed lenses are below the targets
     tab.page.evaluate("() => { document.getElementById('page').scrollTop = 300; }")
     shoot(tab, folder / "editor-target.jpg")
     tab.tab("library")
-    # every flare is drawn once
+    # every thumbnail must be drawn once
     page = tab.page.locator("#page")
     for k in range(6):
         page.evaluate(f"(p) => p.scrollTop = {k * 400}")
@@ -104,7 +105,7 @@ def panels(tab: Tab, folder: Path) -> None:
 
 
 def measured(tab: Tab, folder: Path) -> None:
-    """Choose a ghost of a measured flare."""
+    """Select a ghost of a measured flare."""
     tab.page.mouse.click(*tab.at(0.36, 0.55))
     tab.until("flarewright.ghost && flarewright.view.outline")
     tab.tab("ghosts")
@@ -113,11 +114,11 @@ def measured(tab: Tab, folder: Path) -> None:
 
 
 def main() -> None:
-    """Start an editor of its own, and leave nothing behind but the pictures."""
+    """Start a separate editor, take the screenshots, and remove everything else."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs" / "images"
     model = sys.argv[2:3]
     with tempfile.TemporaryDirectory() as state, browser() as chrome:
-        editor = Editor(state, *model)
+        editor = Editor(state, *model, own_sample=True)
         try:
             visit = measured if model else panels
             visit(Tab(chrome.new_page(viewport={"width": 1280, "height": 720}), editor), folder)

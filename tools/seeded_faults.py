@@ -1,11 +1,11 @@
-"""Seeded faults: small wrong edits of the source, and which of them the tests catch (docs/seeded-faults.md).
+"""Seeded faults: small wrong edits of the source, and whether the tests catch them (docs/seeded-faults.md).
 
     python tools/seeded_faults.py check
     python tools/seeded_faults.py run --results after.json
     python tools/seeded_faults.py table before.json after.json
 
-Each fault replaces one piece of text in one source file. A fault is caught when a test fails, or does not end, on a
-copy of the checkout with that fault in it. The checkout itself is never changed.
+Each fault replaces one piece of text in one source file of a copy of the checkout. A fault is caught when a test fails
+or times out there. The checkout itself does not change.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ KERNELS = SOURCES / "kernels"
 KINDS = ("sign", "factor", "index", "channel", "clip", "layer", "range", "condition", "unit")
 
 TIMEOUT_S = 1200
-"""A run of one fault's tests that takes longer than this counts as a hang, and a hang as caught."""
+"""Time limit for the named tests of one fault; a timeout counts as caught."""
 
 SUITE_TIMEOUT_S = 5400
-"""The same for the whole suite."""
+"""Time limit for the whole suite."""
 
 
 @dataclass(frozen=True)
@@ -53,13 +53,13 @@ class Fault:
     kind : str
         One of `KINDS`.
     file : str
-        The source file, from the root of the checkout. A file that was moved since is found by its text.
+        Source file, relative to the root of the checkout. A moved file is found by its text.
     before, after : str
-        The right text, which stands exactly once in the file, and the wrong one.
+        The correct text, which occurs exactly once in the file, and the wrong one.
     effect : str
-        What comes out wrong.
+        The wrong result.
     tests : tuple of str
-        The test files that most likely catch it, searched first.
+        Test files that most likely catch it; they run first.
     """
 
     id: str
@@ -72,13 +72,13 @@ class Fault:
 
     @property
     def area(self) -> str:
-        """The package that the fault lies in."""
+        """The package of the source file."""
         return self.file.split("/")[2]
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the tests made of a fault: caught or not, by which test, and after how many seconds."""
+    """Result of a fault: whether it was caught, by which test, and after how many seconds."""
 
     caught: bool
     by: str
@@ -86,16 +86,16 @@ class Verdict:
 
 
 Keep = Callable[[dict[str, Verdict]], None]
-"""Takes verdicts as they come in."""
+"""Callback that stores new verdicts."""
 
 
 def read_faults(path: Path = SAMPLE) -> list[Fault]:
-    """Read the sample.
+    """Read the list of faults.
 
     Raises
     ------
     SystemExit
-        When two faults share an id, or one is of an unknown kind.
+        When two faults share an id, or one has an unknown kind.
     """
     rows = tomllib.loads(path.read_text(encoding="utf-8"))["fault"]
     faults = [Fault(**{**row, "tests": tuple(row["tests"])}) for row in rows]
@@ -107,12 +107,12 @@ def read_faults(path: Path = SAMPLE) -> list[Fault]:
 
 
 def locate(fault: Fault, root: Path) -> Path:
-    """Return the file that holds a fault's text exactly once.
+    """Return the file that contains a fault's text exactly once.
 
     Raises
     ------
     LookupError
-        When no file, or more than one, holds it.
+        When no file, or more than one, contains it.
     """
     named = root / fault.file
     if named.is_file() and named.read_text(encoding="utf-8").count(fault.before) == 1:
@@ -120,12 +120,12 @@ def locate(fault: Fault, root: Path) -> Path:
     counts = {path: path.read_text(encoding="utf-8").count(fault.before) for path in (root / SOURCES).rglob("*.py")}
     holders = [path for path, count in counts.items() if count]
     if len(holders) != 1 or counts[holders[0]] != 1:
-        raise LookupError(f"{fault.id}: its text stands in {len(holders)} files; update it in {SAMPLE.name}")
+        raise LookupError(f"{fault.id}: its text occurs in {len(holders)} files; update it in {SAMPLE.name}")
     return holders[0]
 
 
 def problems(faults: Iterable[Fault], root: Path) -> list[str]:
-    """Return what keeps faults from being seeded: text that is gone, wrong text that is no Python, missing tests."""
+    """Return what prevents seeding: missing text, wrong text that is not valid Python, missing tests."""
     found = []
     for fault in faults:
         try:
@@ -140,25 +140,25 @@ def problems(faults: Iterable[Fault], root: Path) -> list[str]:
 
 
 class Copy:
-    """A copy of the checkout that faults are put into, with a cache of compiled kernels that fits the right sources."""
+    """A copy of the checkout for seeding faults, with a cache of the kernels compiled from the correct sources."""
 
     def __init__(self, root: Path, folder: Path) -> None:
         self.tree = folder / "checkout"
         self.cache = folder / "kernels"
-        # tests that fail without any fault, and prove nothing
+        # tests that fail without any fault; they are ignored
         self.broken: list[str] = []
         listed = ["git", "-C", str(root), "ls-files", "-co", "--exclude-standard", "-z"]
         for name in filter(None, subprocess.check_output(listed).decode().split("\0")):
             if (root / name).is_file():
                 (self.tree / name).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy2(root / name, self.tree / name)
-        # some tests read material that lies beside the checkout
+        # some tests read the shared/ folder next to the checkout
         if (root.parent / "shared").is_dir():
             (folder / "shared").symlink_to(root.parent / "shared")
 
     @contextmanager
     def seeded(self, faults: Sequence[Fault]) -> Iterator[Path]:
-        """Put faults into the copy; yields the kernel cache to use, and takes them out again."""
+        """Seed faults into the copy; yields the kernel cache to use, and restores the copy afterwards."""
         kept = {path: (path.read_bytes(), path.stat()) for path in {locate(fault, self.tree) for fault in faults}}
         cache = self.cache
         try:
@@ -166,7 +166,7 @@ class Copy:
                 path = locate(fault, self.tree)
                 text = path.read_text(encoding="utf-8").replace(fault.before, fault.after)
                 path.write_text(text, encoding="utf-8")
-                # Python notices a changed source by whole seconds
+                # Python detects changed sources by whole seconds
                 os.utime(path, (time.time() + count, time.time() + count))
                 if KERNELS in path.relative_to(self.tree).parents:
                     cache = self.cache.with_name("kernels-with-fault")
@@ -178,14 +178,14 @@ class Copy:
             shutil.rmtree(self.cache.with_name("kernels-with-fault"), ignore_errors=True)
 
     def failing(self, faults: Sequence[Fault], words: Sequence[str], timeout: float) -> list[str]:
-        """Return the tests that fail with some faults in the copy; one that does not end is called "no end"."""
+        """Return the tests that fail with some faults in the copy; a timeout is "no end"."""
         results = self.tree.parent / "pytest-cache"
         shutil.rmtree(results, ignore_errors=True)
         command = [sys.executable, "-m", "pytest", "--tb=no", "-o", f"cache_dir={results}", *words]
         command += [word for test in self.broken for word in ("--deselect", test)]
         with self.seeded(faults) as cache:
             environment = {**os.environ, "PYTHONPATH": str(self.tree / "src"), "NUMBA_CACHE_DIR": str(cache)}
-            # without bytecode each process would compile all sources again
+            # without bytecode each process would compile all sources
             environment.pop("PYTHONDONTWRITEBYTECODE", None)
             environment.pop("FLAREWRIGHT_CORPUS", None)
             try:
@@ -201,7 +201,7 @@ class Copy:
 
 
 def by_named_tests(faults: Sequence[Fault], copies: Sequence[Copy], keep: Keep) -> None:
-    """Run the tests that each fault names, one process a copy."""
+    """Run the named tests of each fault, one process per copy."""
     waiting: queue.SimpleQueue[Fault] = queue.SimpleQueue()
     for fault in faults:
         waiting.put(fault)
@@ -230,7 +230,7 @@ def by_named_tests(faults: Sequence[Fault], copies: Sequence[Copy], keep: Keep) 
 
 
 def by_whole_suite(faults: Sequence[Fault], copy: Copy, keep: Keep) -> None:
-    """Run all fast tests with many faults at once, then those that fail with each fault alone."""
+    """Run all fast tests with many faults at once, then the failing tests with each fault alone."""
     failed = copy.failing(faults, [], SUITE_TIMEOUT_S)
     print(f"all fast tests with {len(faults)} faults at once: {len(failed)} fail", flush=True)
     for fault in faults if failed else ():
@@ -241,41 +241,41 @@ def by_whole_suite(faults: Sequence[Fault], copy: Copy, keep: Keep) -> None:
             print(f"  {fault.id}: caught by {alone[0]}", flush=True)
 
 
-def run(asked: argparse.Namespace) -> int:
-    """Seed faults, and write after each of them which were caught."""
-    faults = [fault for fault in read_faults(asked.sample) if not asked.only or fault.id in asked.only]
-    if found := problems(faults, asked.checkout):
+def run(options: argparse.Namespace) -> int:
+    """Seed faults, and write the verdicts after each of them."""
+    faults = [fault for fault in read_faults(options.sample) if not options.only or fault.id in options.only]
+    if found := problems(faults, options.checkout):
         print(*found, sep="\n", file=sys.stderr)
         return 2
     verdicts: dict[str, Verdict] = {}
-    if asked.resume and asked.results.is_file():
-        verdicts = {name: Verdict(**one) for name, one in json.loads(asked.results.read_text()).items()}
+    if options.resume and options.results.is_file():
+        verdicts = {name: Verdict(**one) for name, one in json.loads(options.results.read_text()).items()}
 
     def keep(more: dict[str, Verdict]) -> None:
         verdicts.update(more)
         rows = {name: asdict(one) for name, one in sorted(verdicts.items())}
-        asked.results.write_text(json.dumps(rows, indent=1) + "\n")
+        options.results.write_text(json.dumps(rows, indent=1) + "\n")
 
     with tempfile.TemporaryDirectory(prefix="seeded-faults-") as folder:
-        copies = [Copy(asked.checkout, Path(folder) / str(number)) for number in range(asked.jobs)]
+        copies = [Copy(options.checkout, Path(folder) / str(number)) for number in range(options.jobs)]
         broken = copies[0].failing([], [], SUITE_TIMEOUT_S)
         if broken:
-            print(f"left out, for they fail without any fault: {', '.join(broken)}", flush=True)
+            print(f"ignored, because they fail without any fault: {', '.join(broken)}", flush=True)
         for copy in copies:
             copy.broken = broken
         by_named_tests([fault for fault in faults if fault.id not in verdicts], copies, keep)
-        if not asked.named_only:
+        if not options.named_only:
             by_whole_suite([fault for fault in faults if not verdicts[fault.id].caught], copies[0], keep)
     caught = sum(verdicts[fault.id].caught for fault in faults)
-    print(f"{caught} of {len(faults)} faults caught; written to {asked.results}")
+    print(f"{caught} of {len(faults)} faults caught; written to {options.results}")
     return 0
 
 
-def table(asked: argparse.Namespace) -> int:
-    """Print one or more results as a Markdown table, by area and by kind, and each fault that one of them missed."""
-    faults = read_faults(asked.sample)
-    runs = [json.loads(path.read_text()) for path in asked.results]
-    heads = [path.stem for path in asked.results]
+def table(options: argparse.Namespace) -> int:
+    """Print one or more results as Markdown tables by area and by kind, and each fault that one of them missed."""
+    faults = read_faults(options.sample)
+    runs = [json.loads(path.read_text()) for path in options.results]
+    heads = [path.stem for path in options.results]
 
     def row(name: str, members: list[Fault]) -> str:
         counts = [sum(one.get(fault.id, {}).get("caught", False) for fault in members) for one in runs]
@@ -294,34 +294,34 @@ def table(asked: argparse.Namespace) -> int:
     return 0
 
 
-def check(asked: argparse.Namespace) -> int:
-    """Print the faults that no longer fit the sources."""
-    faults = read_faults(asked.sample)
-    found = problems(faults, asked.checkout)
+def check(options: argparse.Namespace) -> int:
+    """Print the faults that do not fit the sources."""
+    faults = read_faults(options.sample)
+    found = problems(faults, options.checkout)
     print(*found, f"{len(faults)} faults, {len(found)} problems", sep="\n")
     return bool(found)
 
 
 def main() -> int:
-    """Read the command line."""
-    parser = argparse.ArgumentParser(description="Which small wrong edits of the source the tests catch.")
-    parser.add_argument("--sample", type=Path, default=SAMPLE, help="the faults (default: the file beside this one)")
+    """Run the command line."""
+    parser = argparse.ArgumentParser(description="Seed small wrong edits of the source; report which the tests catch.")
+    parser.add_argument("--sample", type=Path, default=SAMPLE, help="file of faults (default: the one in this folder)")
     parser.add_argument("--checkout", type=Path, default=ROOT, help="the checkout to copy (default: this one)")
     commands = parser.add_subparsers(required=True)
-    one = commands.add_parser("check", help="print the faults that no longer fit the sources")
+    one = commands.add_parser("check", help="print the faults that do not fit the sources")
     one.set_defaults(work=check)
     one = commands.add_parser("run", help="seed the faults and run the tests")
     one.add_argument("--results", type=Path, required=True, help="JSON file to write")
-    one.add_argument("--only", nargs="+", metavar="ID", help="only these faults")
-    one.add_argument("--jobs", type=int, default=2, help="faults tried at the same time (default: 2)")
-    one.add_argument("--named-only", action="store_true", help="only the tests that a fault names, not the whole suite")
-    one.add_argument("--resume", action="store_true", help="keep what the results file holds already")
+    one.add_argument("--only", nargs="+", metavar="ID", help="run only these faults")
+    one.add_argument("--jobs", type=int, default=2, help="number of faults at the same time (default: 2)")
+    one.add_argument("--named-only", action="store_true", help="run only the tests that a fault names")
+    one.add_argument("--resume", action="store_true", help="keep the verdicts of the results file")
     one.set_defaults(work=run)
-    one = commands.add_parser("table", help="print results as a table, several side by side")
+    one = commands.add_parser("table", help="print results as a table, several in columns")
     one.add_argument("results", type=Path, nargs="+")
     one.set_defaults(work=table)
-    asked = parser.parse_args()
-    return int(asked.work(asked))
+    options = parser.parse_args()
+    return int(options.work(options))
 
 
 if __name__ == "__main__":

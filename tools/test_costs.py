@@ -1,10 +1,10 @@
-"""What the tests cost: CPU seconds of every test, child processes and compiling in separate columns.
+"""Costs of the tests: CPU seconds of every test, with child processes and compilation in separate columns.
 
-    python tools/test_costs.py run out/costs -m slow      # pytest with these words; a file a process in the folder
+    python tools/test_costs.py run out/costs -m slow      # pytest with these arguments; one file per process
     python tools/test_costs.py table out/costs --by file  # or folder, test; the most expensive first
 
-`pytest --durations` shows wall-clock seconds, which depend on what else runs. CPU seconds depend less on it, and what a
-test spends compiling kernels falls on whichever test calls a kernel first.
+`pytest --durations` shows wall-clock seconds, which depend on the load of the machine. CPU seconds depend less on it;
+compilation of a kernel counts for the test that calls it first.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from typing import Any, TextIO
 import pytest
 
 FOLDER = "FLAREWRIGHT_TEST_COSTS"
-"""Environment variable: the folder that the plugin writes to."""
+"""Environment variable: output folder of the plugin."""
 
 
 class Compiling:
-    """Sums the CPU seconds that this thread spends in Numba's compiler."""
+    """Sums this thread's CPU seconds in Numba's compiler."""
 
     def __init__(self) -> None:
         from numba.core import event
@@ -50,20 +50,20 @@ class Compiling:
 
 
 class Recorder:
-    """A pytest plugin: one line of JSON for each phase of each test."""
+    """A pytest plugin that writes one line of JSON per phase of each test."""
 
     def __init__(self, stream: TextIO) -> None:
         self.stream = stream
         self.compiling = Compiling()
 
     def now(self) -> tuple[float, float, float, float]:
-        """Return CPU seconds of this process and of its children, seconds of compiling, and the clock."""
+        """Return CPU seconds of this process and its children, seconds of compilation, and the clock."""
         times = os.times()
         own, children = times.user + times.system, times.children_user + times.children_system
         return own, children, self.compiling.seconds, time.perf_counter()
 
     def phase(self, test: str) -> Iterator[None]:
-        """Record what passes between the two ends of a hook."""
+        """Record the costs of a hook."""
         before = self.now()
         yield
         own, children, compiling, wall = (round(b - a, 3) for a, b in zip(before, self.now(), strict=True))
@@ -72,7 +72,7 @@ class Recorder:
 
     @pytest.hookimpl(hookwrapper=True)
     def pytest_runtest_setup(self, item: pytest.Item) -> Iterator[None]:
-        """Record fixtures: they fall on the test that asks for them first."""
+        """Record fixtures; they count for the first test that uses them."""
         yield from self.phase(item.nodeid)
 
     @pytest.hookimpl(hookwrapper=True)
@@ -82,11 +82,11 @@ class Recorder:
 
     @pytest.hookimpl(hookwrapper=True)
     def pytest_runtest_teardown(self, item: pytest.Item) -> Iterator[None]:
-        """Record what fixtures undo."""
+        """Record the teardown of fixtures."""
         yield from self.phase(item.nodeid)
 
     def pytest_sessionfinish(self) -> None:
-        """Record the whole process: collecting and importing are in no test."""
+        """Record the whole process, including collection and imports."""
         own, children, compiling, _ = self.now()
         row = {"process": own + children, "children": children, "compiling": compiling}
         self.stream.write(json.dumps(row) + "\n")
@@ -94,7 +94,7 @@ class Recorder:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Record in every process that runs tests."""
+    """Register the plugin in every process that runs tests."""
     folder = os.environ.get(FOLDER)
     hands_out = config.getoption("numprocesses", default=None) and not hasattr(config, "workerinput")
     if folder and not hands_out:
@@ -118,7 +118,7 @@ def run(folder: Path, words: list[str]) -> int:
 
 
 def table(folder: Path, by: str, most: int) -> int:
-    """Print what is most expensive, and all of it together."""
+    """Print the most expensive rows, and the total."""
     sums: dict[str, list[float]] = defaultdict(lambda: [0.0] * 4)
     tests: dict[str, set[str]] = defaultdict(set)
     processes = []
@@ -145,21 +145,21 @@ COLUMNS = ("cpu", "children", "compiling", "wall")
 
 
 def main() -> int:
-    """Read the command line."""
-    parser = argparse.ArgumentParser(description="What the tests cost.")
+    """Run the command line."""
+    parser = argparse.ArgumentParser(description="Costs of the tests.")
     commands = parser.add_subparsers(dest="command", required=True)
-    one = commands.add_parser("run", help="run pytest and record what each test costs")
+    one = commands.add_parser("run", help="run pytest and record the costs of each test")
     one.add_argument("folder", type=Path)
-    one = commands.add_parser("table", help="print what is most expensive")
+    one = commands.add_parser("table", help="print the most expensive tests")
     one.add_argument("folder", type=Path)
     one.add_argument("--by", choices=("folder", "file", "test"), default="file")
     one.add_argument("--most", type=int, default=100, metavar="N", help="rows to print (default: 100)")
-    asked, words = parser.parse_known_args()
-    if asked.command == "run":
-        return run(asked.folder, words)
+    args, words = parser.parse_known_args()
+    if args.command == "run":
+        return run(args.folder, words)
     if words:
         parser.error(f"unknown: {' '.join(words)}")
-    return table(asked.folder, asked.by, asked.most)
+    return table(args.folder, args.by, args.most)
 
 
 if __name__ == "__main__":

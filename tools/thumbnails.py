@@ -1,9 +1,9 @@
-"""Render the small pictures of the library that ship with the package.
+"""Render the thumbnails of the library that ship with the package.
 
-    python tools/thumbnails.py              # all of them, some minutes
-    python tools/thumbnails.py low-sun      # only those whose name has this in it
+    python tools/thumbnails.py              # all of them, takes minutes
+    python tools/thumbnails.py low-sun      # only those whose name contains this
 
-`tests/render/test_gallery.py` (slow) tells when a picture is no longer what its lens or look gives.
+`tests/render/test_gallery.py` (slow) fails when a thumbnail differs from what its lens or look renders.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import sys
 
 from PIL import Image
 
-from flarewright.io.thumbnails import SIZE_PX, thumbnail_path
+from flarewright.io.images.thumbnails import SIZE_PX, thumbnail_path
 from flarewright.render.gallery import card_picture, cards
 
 QUALITY = 88

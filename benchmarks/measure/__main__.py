@@ -1,14 +1,15 @@
-"""The proof of the measurement, as a table.
+"""Benchmark of the measurement, as a table.
 
     python -m benchmarks.measure LENS ... [--width 720] [--merge real|ideal] [--keep FOLDER] [--json FILE]
     python -m benchmarks.measure LENS ... --isolated [--width 360]
+    python -m benchmarks.measure [LENS ...] --ablation
     python -m benchmarks.measure --speed
     python -m benchmarks.measure --planted 25 [--count 100]
 
-A synthetic camera (`tests/measure/synthetic_camera.py`) photographs each lens at the even ones of 100 constellations;
-the model is found, fitted, tracked and compressed from those alone, as `flarewright measure run` does, and judged at
-the odd ones against the noise-free truth, outside 40 (of 720) pixels around the light; and at three of them with the
-light in other directions, against a turned photograph (`rolled`).
+A synthetic camera (`tests/measure/synthetic_camera.py`) photographs each lens at the even ones of 100 constellations.
+The stages find, fit, track and compress use only these, as `flarewright measure run` does. The model is compared with
+the noise-free truth at the odd constellations, outside 40 (of 720) pixels around the light, and at three of them with
+the light in other directions, where a rotated photograph is the reference (`rolled`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from benchmarks.measure.ablation import LENSES, ablation, table
 from benchmarks.measure.isolated import isolated, summary
 from benchmarks.measure.judge import judge
 from benchmarks.measure.planted import planted_time
@@ -27,16 +29,18 @@ from benchmarks.measure.rolled import judge_rolled, shoot_rolled
 from benchmarks.measure.shoot import setup_of, shoot
 from benchmarks.measure.speed import replay_speed
 
-from flarewright.io.captures import read_camera, read_captures
-from flarewright.io.ghost_model_file import write_ghost_model
-from flarewright.io.merged import read_run
-from flarewright.measure.merge_run import merge_captures
-from flarewright.measure.stages import find_ghosts, fit_ghosts
-from flarewright.measure.track_stage import compress_ghosts, track_ghosts
+from flarewright.io.measurement.captures import read_camera, read_captures
+from flarewright.io.measurement.ghost_model_file import write_ghost_model
+from flarewright.io.measurement.merged import read_run
+from flarewright.measure.pipeline.compress_stage import compress_ghosts
+from flarewright.measure.pipeline.find_stage import find_ghosts
+from flarewright.measure.pipeline.fit_stage import fit_ghosts
+from flarewright.measure.pipeline.merge_stage import merge_captures
+from flarewright.measure.pipeline.track_stage import track_ghosts
 
 
 def prove(lens: str, folder: Path, given: argparse.Namespace) -> dict[str, Any]:
-    """Photograph one lens, go through all stages and judge it."""
+    """Photograph one lens, run all stages and return the scores."""
     setup = setup_of(lens, given.width, given.count, given.f_number)
     shoot(setup, folder)
     shoot_rolled(setup, folder)
@@ -75,32 +79,36 @@ def prove(lens: str, folder: Path, given: argparse.Namespace) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Judge lenses and print their scores."""
+    """Compute the scores of lenses and print them."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.measure", description=__doc__)
     parser.add_argument("lens", nargs="*")
-    parser.add_argument("--speed", action="store_true", help="how fast a model replays")
-    parser.add_argument("--planted", type=int, metavar="GHOSTS", help="how long so many take, all constellations seen")
-    parser.add_argument("--isolated", action="store_true", help="ghosts one by one, and Walch's way for comparison")
+    parser.add_argument("--speed", action="store_true", help="measure how fast a model replays")
+    parser.add_argument("--planted", type=int, metavar="GHOSTS", help="time this number of ghosts, all angles used")
+    parser.add_argument("--isolated", action="store_true", help="measure single ghosts and compare with Walch's method")
+    parser.add_argument("--ablation", action="store_true", help="measure what each layer of the residual is worth")
     parser.add_argument("--width", type=int, default=720)
-    parser.add_argument("--count", type=int, default=100, help="constellations, both kinds")
+    parser.add_argument("--count", type=int, default=100, help="number of constellations, even and odd (default: 100)")
     parser.add_argument("--f-number", type=float, default=5.6)
     parser.add_argument("--merge", choices=("real", "ideal"), default="real")
-    parser.add_argument("--keep", type=Path, help="a folder for photographs and models, taken up again")
-    parser.add_argument("--json", type=Path, help="also write the scores here")
+    parser.add_argument("--keep", type=Path, help="folder for photographs and models, reused by later runs")
+    parser.add_argument("--json", type=Path, help="write the scores to this file")
     given = parser.parse_args()
     rows = [replay_speed()] if given.speed else []
     if given.planted:
         rows.append(planted_time(given.planted, given.count, lambda text: print(text, flush=True)))
     for row in rows:
         print(json.dumps(row), flush=True)
-    if given.isolated:
+    if given.ablation:
+        rows += ablation(lambda text: print(text, flush=True), given.lens or LENSES)
+        print(table(rows))
+    elif given.isolated:
         alone: list[dict[str, Any]] = []
         for lens in given.lens:
             alone += isolated(lens, given.width, given.count, given.f_number, lambda text: print(text, flush=True))
         rows += [*alone, summary(alone)]
         print(json.dumps(rows[-1]), flush=True)
     with tempfile.TemporaryDirectory() as made:
-        for lens in () if given.isolated else given.lens:
+        for lens in () if given.isolated or given.ablation else given.lens:
             folder = (given.keep or Path(made)) / f"{Path(lens).stem}-{given.width}-{given.f_number:g}"
             rows.append(prove(lens, folder, given))
             print(json.dumps(rows[-1], indent=1), flush=True)

@@ -1,10 +1,10 @@
-"""Ghosts one by one, without noise and without each other: what the primitive itself is worth, and against Walch's way.
+"""Benchmark of single ghosts, without noise and without each other: accuracy of the primitive, and Walch's method.
 
-Each path is rendered alone at all constellations; where it is clean (it does not fold, one rim bounds it, the picture
-does not cut it: `truth.TrueGhost`) the search and the fit get the even ones, and the odd ones between them are judged
-against a straight line between the neighbours. The same ghosts, one picture each, are fitted with Walch's primitive in
-his own way and, from the same start, by Levenberg and Marquardt; and what ours tells of that picture, from the fit over
-all angles, stands beside it.
+Each path is rendered alone at all constellations. Where it is clean (no fold, one rim, not cut by the picture:
+`truth.TrueGhost`) the search and the fit use the even constellations. The odd ones between them are compared with
+linear interpolation between their neighbours. The same ghosts, one image each, are fitted with Walch's primitive by his
+method and, from the same start, by least squares. The result of our fit over all angles in that image is listed
+beside them.
 """
 
 from __future__ import annotations
@@ -18,43 +18,47 @@ import numpy as np
 from benchmarks.measure.shoot import setup_of
 from benchmarks.measure.truth import cut_by_frame, footprint, forms_of
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 from synthetic_camera import Pose, Setup, ghost_layers, poses, project_of, scale_of
 
-from flarewright.kernels.measure_pupil import FIRST_DISC, FIRST_I
-from flarewright.measure.fit import Fit, refine, render
-from flarewright.measure.grow import Growth, grow, spread_by_colour
-from flarewright.measure.numbers import field, frame
-from flarewright.measure.orders import can_go
-from flarewright.measure.patches import patches_of
-from flarewright.measure.pursuit import pursue
-from flarewright.measure.settle import kinds_of
-from flarewright.measure.shape import Shape, free_numbers, parted
-from flarewright.measure.views import View
-from flarewright.measure.walch import circle, descend, draw, fit_bezier, window_of
-from flarewright.model.ghost_model import Blades
-from flarewright.render.prepare import settle as prepared
+from flarewright.kernels.ghost_model.bezier import BORDER, INNER
+from flarewright.kernels.ghost_model.pupil_mesh import FIRST_DISC, FIRST_I
+from flarewright.measure.compression.order_selection import can_go
+from flarewright.measure.core.parameter_vector import field, frame, with_bounded_controls
+from flarewright.measure.core.parameters import Shape, free_numbers, with_lateral_start
+from flarewright.measure.core.views import View
+from flarewright.measure.detection.matching_pursuit import pursue
+from flarewright.measure.fitting.alternating_fit import kinds_of
+from flarewright.measure.fitting.ghost_fit import Fit, refine, render
+from flarewright.measure.fitting.model_growth import grow, spread_by_colour
+from flarewright.measure.fitting.patches import patches_of
+from flarewright.measure.fitting.settings import Growth
+from flarewright.measure.walch.gradient_descent import circle, descend_gradient, draw_single, window_with_margin
+from flarewright.model.measurement.ghost_model import Blades
+from flarewright.render.scene.resolve import resolve_project as prepared
 
 Floats = NDArray[np.float64]
 
-# ghosts of a lens, by their light
+# number of ghosts per lens, brightest first
 GHOSTS = 5
-# part of a ghost's median level that passes for noise: fits need some
+# assumed noise, part of a ghost's median level; a fit requires some
 NOISE = 1e-2
-# of the constellations that one fit looks at
+# number of constellations per fit
 VIEWS = 16
-# views that must show a ghost
+# least number of views that must show a ghost
 _LEAST_VIEWS = 8
-# every so many constellations tell which ghosts are the brightest
+# step between the constellations that determine the brightest ghosts
 _GLANCE = 8
 _ROUNDS = 200
-# by which a ghost may be described
+# largest number of parameters of a ghost
 NUMBERS = 27
-# with three a ghost of a Nikkor 85 is 1 to 7 % from one of 25, more than a fit misses; with these 0.04 to 0.8 %
+# with 3 wavelengths a ghost of a Nikkor 85 differs from one with 25 by 1 to 7 %, more than the error of a fit; with
+# these by 0.04 to 0.8 %
 WAVELENGTHS = 15
 
 
 def brightest(setup: Setup) -> list[str]:
-    """Return the paths that give most light where they are clean, of those that are so at enough constellations."""
+    """Return the paths with the most light where they are clean, of those that are clean at enough constellations."""
     scale = scale_of(setup)
     light: dict[str, list[float]] = {}
     for pose in poses(setup)[::_GLANCE]:
@@ -67,13 +71,13 @@ def brightest(setup: Setup) -> list[str]:
 
 
 def _clean(green: Floats, form: tuple[bool, bool] | None, size_px: tuple[int, int]) -> bool:
-    """Tell whether a picture shows a ghost that is whole: `form` says whether it folds, and is cut by several rims."""
+    """Return whether a picture shows a whole ghost; `form`: whether it folds, and whether several rims cut it."""
     seen = footprint(green)
     return seen is not None and form is not None and not any(form) and not cut_by_frame(seen[0], size_px)
 
 
 def pictures_of(setup: Setup) -> tuple[list[Pose], dict[str, list[Floats | None]]]:
-    """Return the poses, and of every path its green at each pose; None where it is not clean."""
+    """Return the poses, and for every path its green image at each pose, None where it is not clean."""
     scale = scale_of(replace(setup, paths=()))
     every = poses(setup)
     found: dict[str, list[Floats | None]] = {name: [None] * len(every) for name in setup.paths}
@@ -86,7 +90,7 @@ def pictures_of(setup: Setup) -> tuple[list[Pose], dict[str, list[Floats | None]
 
 
 def _longest(pictures: list[Floats | None]) -> list[Floats | None]:
-    """Return pictures with those alone that are there most times in a row: what comes after a gap is another part."""
+    """Keep only the longest run of consecutive images; beyond a gap the ghost is another part of the path."""
     runs, begin = [(0, 0)], 0
     for k, picture in enumerate([*pictures, None]):
         if picture is None:
@@ -97,7 +101,7 @@ def _longest(pictures: list[Floats | None]) -> list[Floats | None]:
 
 
 def view_of(setup: Setup, pose: Pose, green: Floats | None, noise: float) -> View:
-    """Return one picture as the fitter takes it."""
+    """Return one image as the fitter uses it."""
     width, height = setup.size_px
     shown = np.zeros((height, width)) if green is None else green
     placed = frame(setup.axis_px, setup.roll_deg, pose.constellation_deg, 1.0)
@@ -110,9 +114,9 @@ def view_of(setup: Setup, pose: Pose, green: Floats | None, noise: float) -> Vie
 
 
 def isolated(lens: str, width: int, count: int, f_number: float, tell: Callable[[str], None]) -> list[dict[str, Any]]:
-    """Return what came of each of a lens' brightest clean ghosts."""
+    """Return the results for each of a lens' brightest clean ghosts."""
     setup = replace(setup_of(lens, width, count, f_number).steady, wavelengths=WAVELENGTHS)
-    # a glance counts roughly: some of them turn out to be clean too seldom
+    # the brightness is sampled coarsely: some of these paths are clean too rarely
     setup = replace(setup, paths=tuple(brightest(setup)[: 2 * GHOSTS]))
     if not setup.paths:
         return []
@@ -132,14 +136,14 @@ def isolated(lens: str, width: int, count: int, f_number: float, tell: Callable[
 
 
 def iris_of_setup(setup: Setup) -> Blades | None:
-    """Return the iris that the lens has, which a run finds from its star; None: round."""
+    """Return the lens' iris, which a run detects from the star; None: round."""
     iris = prepared(project_of(setup, poses(setup)[0], "ghosts")).iris
-    # its first edge is up
+    # the first edge is at the top
     return Blades(count=iris.blades, first_deg=90.0 + iris.rotation_deg) if iris.blades and not iris.rounding else None
 
 
 def _alone(views: list[View], iris: Blades | None) -> tuple[dict[str, Any], Shape | None]:
-    """Find and fit one ghost at the even views; return its numbers and its gain over interpolation at the odd ones."""
+    """Find and fit one ghost at the even views; return its results and its gain over interpolation at the odd ones."""
     clean = [bool(view.pixels.any()) for view in views]
     even = [view for view, whole in zip(views[::2], clean[::2], strict=True) if whole]
     start = time.process_time()
@@ -150,7 +154,7 @@ def _alone(views: list[View], iris: Blades | None) -> tuple[dict[str, Any], Shap
     rough = max(found, key=lambda one: one.shapes[1].numbers[FIRST_I])
     shown = even[:: max(1, len(even) // VIEWS)]
     fits = [fit for start in kinds_of(rough.shapes[1], iris) if (fit := _fitted(start, shown)) is not None]
-    # each fit looked at its own windows: by those who covers less of a ghost would seem to miss less
+    # compare over whole images: over its own windows a fit that covers less of a ghost would have less error
     best = min(fits, key=lambda fit: sum(_squares(fit.shape, view) for view in shown))
     took = time.process_time() - start
     mine = between = whole = 0.0
@@ -172,25 +176,25 @@ def _alone(views: list[View], iris: Blades | None) -> tuple[dict[str, Any], Shap
 
 
 def _squares(shape: Shape, view: View) -> float:
-    """Return by which squares a shape misses a whole picture."""
+    """Return the squared error of a shape in a whole image."""
     return float(((render(shape, view) - view.pixels[..., 1]) ** 2).sum())
 
 
 def _fitted(start: Shape, views: list[View]) -> Fit | None:
-    """Fit a ghost as far as `NUMBERS` go, until noise hides every step."""
+    """Fit a ghost with at most `NUMBERS` parameters, until noise hides every step."""
     grown = grow(start, views, 1, most=Growth(order=2, discs=1))
     if grown is None:
         return None
-    shape, width = parted(spread_by_colour(grown, views, 1).shape), views[0].size_px[0]
+    shape, width = with_lateral_start(spread_by_colour(grown, views, 1).shape), views[0].size_px[0]
     patches = patches_of(shape, views, 1)
     if not patches:
         return None
-    # a rim's centre moves evenly with the field
+    # the centre of a rim moves linearly with the field
     free = free_numbers(2, shape.discs, 2, True, True, True)
     free = free[free != FIRST_DISC + 1]
     fit = refine(shape, patches, free, width=width, steps=20, error=0.0)
     while free.size > NUMBERS:
-        # of what may go, what is least sure to be there
+        # remove the least significant of the removable parameters
         may_go = free[can_go(free)]
         least = may_go[np.argmin(np.abs(fit.shape.numbers[may_go]) / np.maximum(fit.uncertainty[may_go], 1e-300))]
         free, numbers = free[free != least], fit.shape.numbers.copy()
@@ -202,7 +206,7 @@ def _fitted(start: Shape, views: list[View]) -> Fit | None:
 def _against_walch(
     views: list[View], images: list[Floats | None], shape: Shape | None, row: dict[str, Any]
 ) -> dict[str, Any]:
-    """Fit the picture in the middle of a ghost's life with Walch's primitive in both ways; return times and errors."""
+    """Fit the middle image of a ghost's range with Walch's primitive by both methods; return times and errors."""
     shown = [k for k, each in enumerate(images) if each is not None]
     view = views[shown[len(shown) // 2]]
     green = view.pixels[..., 1].astype(float)
@@ -210,57 +214,73 @@ def _against_walch(
     if seen is None:
         return {}
     (left, top, width, height), _, level = seen
-    # the middle of the outline along the light's line, and its mean size
+    # start: centre of the outline along the light's line, and its mean size
     x, y = left + 0.5 * width - view.frame[0], top + 0.5 * height - view.frame[1]
     centre, radius = x * view.frame[2] - y * view.frame[3], 0.25 * (width + height)
     start = circle(centre + 0.1 * radius, 1.1 * radius, np.full(3, 0.8 * level), np.full(3, 0.8 * level))
-    window = window_of(start, view.frame, view.size_px, margin=8)
+    window = window_with_margin(start, view.frame, view.size_px, margin=8)
     x0, y0, w, h = window
     wanted = green[y0 : y0 + h, x0 : x0 + w]
     if wanted.size == 0:
         return {}
-    draw(start, view.frame, window)
-    fit_bezier(start, *_colours(wanted, level), view.frame, window, steps=1)
+    draw_single(start, view.frame, window)
     begin = time.process_time()
-    mine, _ = fit_bezier(start, *_colours(wanted, level), view.frame, window)
+    mine, drawn = _least_squares(start, wanted, view.frame, window)
     middle = time.process_time()
-    his = descend(start, wanted, view.frame, window, rounds=_ROUNDS)
+    his = descend_gradient(start, wanted, view.frame, window, rounds=_ROUNDS)
     end = time.process_time()
     errors = [
-        float(np.sqrt(((draw(one.numbers, view.frame, window)[..., 1] - wanted) ** 2).mean())) / level
-        for one in (mine, his)
+        float(np.sqrt(((draw_single(numbers, view.frame, window)[..., 1] - wanted) ** 2).mean())) / level
+        for numbers in (mine, his.numbers)
     ]
-    told = {
+    reported = {
         "walch, his primitive: times slower": (end - middle) / max(middle - begin, 1e-9),
         "error over his, his primitive": errors[0] / errors[1],
-        "error, his": errors[1], "pictures": (mine.evaluations, his.evaluations),
+        "error, his": errors[1], "pictures": (drawn, his.evaluations),
     }  # fmt: skip
     if shape is not None:
         ours = render(shape, view)[y0 : y0 + h, x0 : x0 + w]
         error = float(np.sqrt(((ours - wanted) ** 2).mean())) / level
         slower = (end - middle) / row["fit CPU s a picture"]
-        told |= {
+        reported |= {
             "walch: times slower": slower,
-            # he is given a start
+            # his method is given a start, so compare without the search
             "walch: times slower than the fit alone": slower / (1.0 - row["of it search"]),
             "error over his": error / errors[1],
         }
-    return told
+    return reported
 
 
-def _colours(wanted: Floats, level: float) -> tuple[Floats, Floats]:
-    """Return a picture in three colours alike, and weights."""
-    picture = np.repeat(wanted[..., None], 3, axis=2)
-    return picture, np.full_like(picture, 1.0 / (0.01 * level) ** 2)
+def _least_squares(
+    start: Floats, wanted: Floats, frame: Floats, window: tuple[int, int, int, int]
+) -> tuple[Floats, int]:
+    """Fit a Bezier ghost to one green image by trust-region least squares; return its numbers and images drawn."""
+    free = np.r_[0:13, BORDER + 1, INNER + 1]
+    low = np.full(len(free), -np.inf)
+    low[2:5], low[9:13] = 0.5, 0.05
+    drawn = 0
+
+    def numbers_of(values: Floats) -> Floats:
+        numbers = start.copy()
+        numbers[free] = values
+        return with_bounded_controls(numbers)
+
+    def missed(values: Floats) -> Floats:
+        nonlocal drawn
+        drawn += 1
+        return (draw_single(numbers_of(values), frame, window)[..., 1] - wanted).ravel()
+
+    fit = least_squares(missed, start[free], bounds=(low, np.inf), x_scale="jac", max_nfev=40)
+    return numbers_of(fit.x), drawn
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return the table's rows of many ghosts."""
+    """Return the rows of the table over many ghosts."""
     good = [row for row in rows if row["gain dB"] is not None and row["gain dB"] >= 10.0 and row["numbers"] <= NUMBERS]
 
     def median(key: str) -> float | None:
-        told = [row[key] for row in rows if key in row]
-        return float(np.median(told)) if told else None
+        reported = [row[key] for row in rows if key in row]
+        return float(np.median(reported)) if reported else None
 
     return {
         "isolated ghosts": len(rows), "of at most 27 numbers, 10 dB and more": len(good),

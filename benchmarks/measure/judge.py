@@ -1,4 +1,4 @@
-"""Judge a ghost model at constellations that it has not seen, by the noise-free truth."""
+"""Compare a ghost model with the noise-free truth, at constellations that the fit did not use."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from benchmarks.measure.shoot import read_ghosts, read_poses, read_truth
 from benchmarks.measure.truth import TrueGhost, footprint
 from numpy.typing import NDArray
 
-from flarewright.io.merged import read_frame
-from flarewright.measure.glow import offsets
-from flarewright.measure.replay import draw, replay
-from flarewright.model.capture import MergedFrame, MergedRun
-from flarewright.model.ghost_model import GhostModel
+from flarewright.io.measurement.merged import read_frame
+from flarewright.measure.glow.laws import offsets
+from flarewright.measure.replay.model_image import draw, replay_model
+from flarewright.model.measurement.capture import MergedFrame, MergedRun
+from flarewright.model.measurement.ghost_model import GhostModel
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# nothing is judged nearer to the light, pixels of a picture 720 wide
+# radius around the light that is left out, part of the picture's width
 AROUND_LIGHT = 40.0 / 720.0
 SEEN, SHARP = 3.0, 5.0
-# footprints that share this part of what either covers are one ghost
+# least common part of the union of two footprints that belong to one ghost
 SAME = 0.5
-# a fragment: this part of it lies in the true ghost, which is there as bright as the fragment within this factor
+# a fragment: least part of it inside the true ghost, and largest ratio of their brightness there
 INSIDE, AS_BRIGHT = 0.7, 2.5
-# two paths whose footprints share this part of what either covers wherever both are seen are one ghost to any camera
+# least common part of the union of two paths' footprints, wherever both are visible, that no camera can separate
 COINCIDE = 0.9
 CLASSES = ("clean", "fold", "cut", "at the edge", "outshone")
 
 
 @dataclass(frozen=True)
 class FoundGhost:
-    """One ghost of a model at one constellation: its footprint in the whole picture, and how bright it is there."""
+    """A ghost of a model at one constellation: its footprint in the whole picture, and its brightness."""
 
     name: str
     mask: Mask
@@ -43,11 +43,12 @@ class FoundGhost:
 
 @dataclass
 class Tally:
-    """What was counted, constellation after constellation, by the class of the true ghost.
+    """Counts over all constellations, by class of the true ghost.
 
-    `found` are ghosts of a model, fragments merged, that belong to a true ghost of a class; `good` those of them that
-    are it; `strange` belong to none. `apart` and `met_apart` count true ghosts, coinciding paths as one. `near` counts
-    true ghosts whose footprint something found shares, though it may stand for another one: no target goes by it.
+    `found` counts ghosts of a model, with fragments merged, that belong to a true ghost of a class; `good` those of
+    them whose footprint matches; `strange` those of no true ghost. `apart` and `met_apart` count true ghosts, with
+    coinciding paths as one. `near` counts true ghosts that share their footprint with any found ghost, which can belong
+    to another one; no target uses it.
     """
 
     true: dict[str, int] = field(default_factory=lambda: dict.fromkeys(CLASSES, 0))
@@ -68,7 +69,7 @@ class Tally:
 
 
 def class_of(ghost: TrueGhost) -> str:
-    """Return what makes a ghost hard, the worst first."""
+    """Return the class of a ghost: its worst difficulty."""
     if ghost.fold:
         return "fold"
     if ghost.cut:
@@ -79,16 +80,16 @@ def class_of(ghost: TrueGhost) -> str:
 
 
 def judge(model: GhostModel, folder: Path, run_folder: Path, run: MergedRun) -> dict[str, Any]:
-    """Return a model's scores.
+    """Compute the scores of a model.
 
     Parameters
     ----------
     model : GhostModel
-        Fitted at the even angles.
+        Fitted at the even constellations.
     folder : Path
-        That `shoot` has filled.
+        Folder filled by `shoot`.
     run_folder, run
-        The merged even angles, which interpolation gets.
+        Merged even constellations, the input of the interpolation.
 
     Returns
     -------
@@ -106,7 +107,7 @@ def judge(model: GhostModel, folder: Path, run_folder: Path, run: MergedRun) -> 
         below = [info for info in around if info.nominal_deg < pose["nominal_deg"]]
         above = [info for info in around if info.nominal_deg > pose["nominal_deg"]]
         far = far_from(pose["light_px"], run.size_px) & far_from(pose["image_px"], run.size_px)
-        picture = replay(model, pose["constellation_deg"], roll_deg=pose["roll_deg"])[0].pixels
+        picture = replay_model(model, pose["constellation_deg"], roll_deg=pose["roll_deg"])[0].pixels
         if below and above:
             pair = [frames.setdefault(info.file, read_frame(run_folder, info)) for info in (below[-1], above[0])]
             frames = {one.info.file: one for one in pair}
@@ -118,7 +119,7 @@ def judge(model: GhostModel, folder: Path, run_folder: Path, run: MergedRun) -> 
 
 
 def far_from(place_px: tuple[float, float], size_px: tuple[int, int]) -> Mask:
-    """Return which pixels are far enough from a place to be judged."""
+    """Return which pixels are far enough from a place to count."""
     return np.asarray(np.hypot(*offsets(tuple(place_px), size_px, 1.0)) > AROUND_LIGHT * size_px[0])
 
 
@@ -156,10 +157,10 @@ def _ssim(a: Floats, b: Floats, known: Mask, reach: float, side: int = 7) -> flo
 
 
 def found_ghosts(model: GhostModel, pose: dict[str, Any], sigma: NDArray[np.float32], far: Mask) -> list[FoundGhost]:
-    """Return what a model shows at a constellation above the noise, away from the light."""
+    """Return the ghosts of a model at a constellation that are above the noise and away from the light."""
     found = []
     size = sigma.shape[1], sigma.shape[0]
-    # a copy is validated, and the cells of what is no ghost take long
+    # `replace` validates the copy, and large sprites take long
     bare = model.replace(sprites=())
     for ghost in model.ghosts:
         if not ghost.visible_deg[0] <= pose["constellation_deg"] <= ghost.visible_deg[1]:
@@ -178,7 +179,7 @@ def found_ghosts(model: GhostModel, pose: dict[str, Any], sigma: NDArray[np.floa
 
 
 def coinciding(folder: Path) -> dict[str, str]:
-    """Return of every path that coincides with a brighter one that one's name."""
+    """Return for every path that coincides with a brighter path the name of that path."""
     least: dict[tuple[str, str], float] = {}
     for pose in read_poses(folder):
         ghosts = [ghost for ghost in read_ghosts(folder, pose["number"]) or [] if ghost.snr >= SEEN]
@@ -195,7 +196,7 @@ def coinciding(folder: Path) -> dict[str, str]:
 
 
 def _shared(a: TrueGhost, b: TrueGhost) -> float:
-    """Return which part of what either covers both cover."""
+    """Return the common part of the union of two footprints."""
     left, top = max(a.window[0], b.window[0]), max(a.window[1], b.window[1])
     right = min(a.window[0] + a.window[2], b.window[0] + b.window[2])
     bottom = min(a.window[1] + a.window[3], b.window[1] + b.window[3])
@@ -217,7 +218,7 @@ def _judge_ghosts(
         ghost.snr >= SEEN and bool((mask & far).sum() > 0.5 * mask.sum())
         for ghost, mask in zip(ghosts, masks, strict=True)
     ]
-    # whole ghosts first, the best pairs before others; what is left may be a fragment
+    # match whole ghosts first, best pairs first; unmatched ones can be fragments
     overlaps = np.array([[_overlap(mask, one.mask) for one in found] for mask in masks]).reshape(len(masks), len(found))
     groups: dict[int, list[int]] = {}
     free = set(range(len(found)))
@@ -268,7 +269,7 @@ def _overlap(a: Mask, b: Mask) -> float:
 
 
 def _fragment_of(one: FoundGhost, ghosts: list[TrueGhost], masks: list[Mask]) -> int | None:
-    """Return the true ghost that a found one is a part of: it lies in it, and light of its brightness is there."""
+    """Return the true ghost that contains a found one and has light of its brightness there, if any."""
     best, at = np.log(AS_BRIGHT), None
     small = one.mask[::2, ::2]
     for t, (ghost, mask) in enumerate(zip(ghosts, masks, strict=True)):
@@ -287,13 +288,13 @@ def _fragment_of(one: FoundGhost, ghosts: list[TrueGhost], masks: list[Mask]) ->
 
 
 def _middle(mask: Mask) -> tuple[float, float]:
-    """Return the middle of a footprint's outline."""
+    """Return the centre of a footprint's bounding box."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     return 0.5 * (columns[0] + columns[-1] + 1.0), 0.5 * (rows[0] + rows[-1] + 1.0)
 
 
 def summary(tally: Tally) -> dict[str, Any]:
-    """Return a tally's scores."""
+    """Return the scores of a tally."""
 
     def spread(values: list[float]) -> list[float] | None:
         return [len(values), float(np.median(values)), float(np.percentile(values, 90))] if values else None

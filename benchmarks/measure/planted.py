@@ -1,4 +1,4 @@
-"""How long a measurement takes: planted ghosts at all constellations, from merged frames to the model of a camera."""
+"""Benchmark of the run time of a measurement: planted ghosts at all constellations, from merged frames to the model."""
 
 from __future__ import annotations
 
@@ -13,26 +13,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flarewright.io.merged import write_frame, write_run
-from flarewright.measure.numbers import NUMBERS, channel_of
-from flarewright.measure.replay import draw
-from flarewright.measure.stages import find_ghosts, fit_ghosts
-from flarewright.measure.track_stage import compress_ghosts, track_ghosts
-from flarewright.model.capture import FrameInfo, MergedFrame, MergedRun
-from flarewright.model.ghost_model import AberrationGhost, GhostModel
+from flarewright.io.measurement.merged import write_frame, write_run
+from flarewright.measure.core.parameter_vector import NUMBERS, channel_of
+from flarewright.measure.pipeline.compress_stage import compress_ghosts
+from flarewright.measure.pipeline.find_stage import find_ghosts
+from flarewright.measure.pipeline.fit_stage import fit_ghosts
+from flarewright.measure.pipeline.track_stage import track_ghosts
+from flarewright.measure.replay.model_image import draw
+from flarewright.model.measurement.capture import FrameInfo, MergedFrame, MergedRun
+from flarewright.model.measurement.ghost_model import AberrationGhost, GhostModel
 
-# pixels and degrees
+# picture size, pixels; focal length, pixels; largest constellation, degrees
 SIZE, FOCAL_PX, LARGEST_DEG = (720, 480), 720.0, 29.7
 AXIS_PX = (363.0, 238.0)
-# of a pixel, in every colour; ghosts are 20 to 500 times as bright
+# standard deviation of a pixel in each colour; ghosts are 20 to 500 times as bright
 NOISE = 0.002
 _COLOURS = ("red", "green", "blue")
-# a ghost's size in each colour: lateral colour
+# relative size of a ghost in each colour (lateral colour)
 _SPREAD = (1.01, 1.0, 0.985)
 
 
 def planted(count: int, seed: int = 1) -> GhostModel:
-    """Return a model of ghosts of radius 8 to 120 pixels, every second one cut by a rim, a little aberrated."""
+    """Return a model of ghosts of radius 8 to 120 pixels, slightly aberrated, every second one cut by a rim."""
     rng = np.random.default_rng(seed)
     ghosts = []
     for k in range(count):
@@ -57,7 +59,7 @@ def planted(count: int, seed: int = 1) -> GhostModel:
 
 
 def write_planted(model: GhostModel, angles: NDArray[np.float64], folder: Path, seed: int = 2) -> MergedRun:
-    """Write the merged frames of a model: what it shows, and noise."""
+    """Write the merged frames of a model: its replay with noise."""
     rng = np.random.default_rng(seed)
     (folder / "frames").mkdir(parents=True, exist_ok=True)
     frames = []
@@ -77,16 +79,16 @@ def write_planted(model: GhostModel, angles: NDArray[np.float64], folder: Path, 
 
 
 def planted_time(count: int, constellations: int, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Measure planted ghosts; return times, and the error halfway between the constellations that were seen.
+    """Measure planted ghosts; return times, and the error halfway between the constellations used.
 
     Parameters
     ----------
     count : int
-        Ghosts.
+        Number of ghosts.
     constellations : int
-        All of them photographed.
+        Number of constellations, all of them photographed.
     tell : callable
-        Gets a line when a stage ends.
+        Called with a line after each stage.
     """
     truth = planted(count)
     angles = np.linspace(0.0, LARGEST_DEG, constellations)
@@ -118,10 +120,10 @@ def planted_time(count: int, constellations: int, tell: Callable[[str], None]) -
 
 
 def halfway(model: GhostModel, truth: GhostModel, angles: NDArray[np.float64]) -> dict[str, float]:
-    """Return how far a model and interpolated pictures are from the truth between some constellations."""
+    """Return the errors of a model and of interpolated images against the truth, between some constellations."""
     mine = between = whole = 0.0
     for first, second in pairwise(angles[:: max(1, len(angles) // 10)]):
-        # the two constellations on either side of the middle
+        # the two constellations around the midpoint
         at = int(np.searchsorted(angles, 0.5 * (first + second)))
         angle = 0.5 * float(angles[at - 1] + angles[at])
         before, true, after = (draw(truth, float(one), 0.0, SIZE) for one in (angles[at - 1], angle, angles[at]))

@@ -1,8 +1,8 @@
-"""Judge a replay with the light in other directions than it was photographed in.
+"""Evaluate a replay with the light in other directions than in its photographs.
 
-Ghosts of a lens of revolution turn with the light; the blades of its iris stand still, and corners come into the
-picture that no photograph showed. The truth is rendered anew there. What anyone can do without a model is to turn the
-photograph: that is what a replay is compared with.
+Ghosts of a lens of revolution turn with the light, but the blades of its iris do not, and the picture has corners that
+no photograph showed. The truth is rendered for these directions. The reference is the rotated photograph, which needs
+no model.
 """
 
 from __future__ import annotations
@@ -16,51 +16,51 @@ from benchmarks.measure.judge import far_from
 from numpy.typing import NDArray
 from synthetic_camera import Setup, poses, scale_of, truth_of
 
-from flarewright.io.merged import read_frame
-from flarewright.measure.replay import replay
-from flarewright.measure.sprites import samples
-from flarewright.model.capture import MergedFrame, MergedRun
-from flarewright.model.ghost_model import GhostModel
+from flarewright.io.measurement.merged import read_frame
+from flarewright.measure.replay.model_image import replay_model
+from flarewright.measure.replay.sprites import samples
+from flarewright.model.measurement.capture import MergedFrame, MergedRun
+from flarewright.model.measurement.ghost_model import GhostModel
 
 Pixels = NDArray[np.float32]
 
-# constellations of the hundred, and directions of the light
+# indices of constellations (of a hundred), and directions of the light
 AT, ROLLS_DEG = (20, 50, 80), (30.0, 90.0, 180.0)
 
 
 def shoot_rolled(setup: Setup, folder: Path) -> None:
-    """Write `rolled.npz`: the noise-free picture at a few constellations and rolls. What is there is kept."""
+    """Write `rolled.npz`, the noise-free picture at a few constellations and rolls, unless it exists."""
     if (folder / "rolled.npz").is_file():
         return
     scale = scale_of(setup)
     angles = [setup.angles_deg[min(k, len(setup.angles_deg) - 1)] for k in AT]
-    told: list[tuple[float, float, float, float]] = []
+    reported: list[tuple[float, float, float, float]] = []
     pictures = []
     for roll in ROLLS_DEG:
         still = replace(setup.steady, haze=setup.haze, veil=setup.veil, angles_deg=tuple(angles), roll_deg=roll)
         for pose in poses(still):
             truth = truth_of(still, pose, scale)
-            told.append((pose.constellation_deg, roll, *truth.light_px))
+            reported.append((pose.constellation_deg, roll, *truth.light_px))
             pictures.append(truth.total)
-    np.savez(folder / "rolled.npz", told=np.array(told), pictures=np.stack(pictures))
+    np.savez(folder / "rolled.npz", reported=np.array(reported), pictures=np.stack(pictures))
 
 
 def judge_rolled(model: GhostModel, folder: Path, run_folder: Path, run: MergedRun) -> dict[str, Any]:
-    """Return a replay's errors against a turned photograph's, dB, where a photograph shows the place and elsewhere.
+    """Return a replay's errors against a rotated photograph's, dB, inside the photographed area and beyond.
 
     Parameters
     ----------
     model, folder, run_folder, run
-        As of `judge`.
+        As for `judge`.
     """
     with np.load(folder / "rolled.npz") as held:
-        told, pictures = held["told"], held["pictures"]
+        reported, pictures = held["reported"], held["pictures"]
     sums: dict[str, list[tuple[float, float]]] = {}
     rows = []
-    for (constellation, roll, *light), true in zip(told, pictures, strict=True):
+    for (constellation, roll, *light), true in zip(reported, pictures, strict=True):
         frame = read_frame(run_folder, min(run.frames, key=lambda info: abs(info.constellation_deg - constellation)))
-        turned, shown = _turned(frame, float(roll))
-        mine = replay(model, float(constellation), roll_deg=float(roll))[0].pixels
+        turned, shown = turned_photograph(frame, float(roll))
+        mine = replay_model(model, float(constellation), roll_deg=float(roll))[0].pixels
         far = far_from((light[0], light[1]), run.size_px)
         floor = float(np.sqrt(np.median(frame.variance[np.isfinite(frame.variance)])))
         logs = [np.log(np.maximum(each, 0.0) + floor) for each in (mine, turned, true)]
@@ -78,8 +78,8 @@ def judge_rolled(model: GhostModel, folder: Path, run_folder: Path, run: MergedR
     return {"rolled, dB": gains, "rolled": rows}
 
 
-def _turned(frame: MergedFrame, roll_deg: float) -> tuple[Pixels, NDArray[np.bool_]]:
-    """Turn a photograph about the axis so that its light lies in a direction; beyond its border it is as there."""
+def turned_photograph(frame: MergedFrame, roll_deg: float) -> tuple[Pixels, NDArray[np.bool_]]:
+    """Rotate a photograph about the axis to another light direction; beyond its border the border is repeated."""
     height, width = frame.radiance.shape[:2]
     turn = np.radians(roll_deg - frame.info.roll_deg)
     y, x = np.mgrid[:height, :width] + 0.5

@@ -1,4 +1,4 @@
-"""Photograph a lens with the synthetic camera: captures at the even angles, truth at the odd ones."""
+"""Photograph a lens with the synthetic camera: captures at the even constellations, truth at the odd ones."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from benchmarks.measure.truth import TrueGhost, true_ghosts
 from numpy.typing import NDArray
 from synthetic_camera import Setup, expose, ideal_frame, poses, scale_of, truth_of
 
-from flarewright.io.merged import write_frame, write_run
-from flarewright.model.capture import CameraNoise, FrameInfo, MergedRun
+from flarewright.io.measurement.merged import write_frame, write_run
+from flarewright.model.measurement.capture import CameraNoise, FrameInfo, MergedRun
 
-# every so many odd angles is judged ghost by ghost; the pictures are judged at all of them
+# step between the odd constellations whose single ghosts are evaluated; the pictures are evaluated at all of them
 EVERY = 2
 
 
 def setup_of(lens: str, width: int = 720, count: int = 100, f_number: float | None = 5.6, seed: int = 5) -> Setup:
-    """Return the proof's setup of a lens: steps of 0.3 degrees when there are 100."""
+    """Return the benchmark's setup of a lens; 100 constellations have steps of 0.3 degrees."""
     angles = tuple(np.round(np.linspace(0.0, 29.7, count), 6).tolist())
     return Setup(
         lens=lens, quality="final", size_px=(width, width * 2 // 3), angles_deg=angles, f_number=f_number, seed=seed,
@@ -33,8 +33,8 @@ def setup_of(lens: str, width: int = 720, count: int = 100, f_number: float | No
 def shoot(setup: Setup, folder: Path) -> None:
     """Write `captures.csv` and photographs, `ideal/` (a run with a perfect merge), and the truth.
 
-    Constellations with even numbers alone are photographed. Of the odd ones `truth-KKK.npz` holds the noise-free
-    picture and its noise, and `ghosts-KKK.pickle` every second time the ghosts. What is there is kept.
+    Only even constellations are photographed. For each odd one, `truth-KKK.npz` holds the noise-free picture and its
+    noise; for every second of them, `ghosts-KKK.pickle` holds the ghosts. Existing files are kept.
     """
     if (folder / "truth.json").is_file():
         return
@@ -63,7 +63,7 @@ def shoot(setup: Setup, folder: Path) -> None:
             name = f"capture-{pose.number:03d}-{j}.npy"
             np.save(folder / name, expose(setup, truth.total, exposure, pose.brightness[j], (pose.number, j)))
             lines.append(f"{name},{pose.nominal_deg:.6g},{exposure!r},{setup.iso:g},,{setup.roll_deg:g}")
-    write_run(folder / "ideal", _run(setup, tuple(frames)))
+    write_run(folder / "ideal", run_of(setup, tuple(frames)))
     (folder / "captures.csv").write_text("\n".join(lines) + "\n", "utf-8")
     camera = {"black_level": setup.black, "white_level": setup.white, "iso": setup.iso}
     (folder / "camera.json").write_text(json.dumps(camera) + "\n", "utf-8")
@@ -71,8 +71,8 @@ def shoot(setup: Setup, folder: Path) -> None:
     (folder / "truth.json").write_text(json.dumps(data) + "\n", "utf-8")
 
 
-def _run(setup: Setup, frames: tuple[FrameInfo, ...]) -> MergedRun:
-    """Return the index of the perfect merge: axis and focal length are known."""
+def run_of(setup: Setup, frames: tuple[FrameInfo, ...]) -> MergedRun:
+    """Return the index of the perfect merge, with known axis and focal length."""
     reach = []
     for info in frames:
         x, y = info.light_px[0] - info.axis_px[0], info.light_px[1] - info.axis_px[1]
@@ -89,18 +89,18 @@ def _run(setup: Setup, frames: tuple[FrameInfo, ...]) -> MergedRun:
 
 
 def read_poses(folder: Path) -> list[dict[str, Any]]:
-    """Return what is true of each constellation."""
+    """Return the true values of each constellation."""
     return list(json.loads((folder / "truth.json").read_text("utf-8"))["poses"])
 
 
 def read_truth(folder: Path, number: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the noise-free picture of an odd constellation and green's noise."""
+    """Return the noise-free picture of an odd constellation, and the noise of green."""
     with np.load(folder / f"truth-{number:03d}.npz") as held:
         return held["total"], held["sigma"]
 
 
 def read_ghosts(folder: Path, number: int) -> list[TrueGhost] | None:
-    """Return the true ghosts of an odd constellation; None where they are not judged."""
+    """Return the true ghosts of an odd constellation; None where they are not evaluated."""
     path = folder / f"ghosts-{number:03d}.pickle"
-    # written by this program into its own folder
+    # the pickle is safe to load: this program wrote it
     return pickle.loads(path.read_bytes()) if path.is_file() else None

@@ -1,4 +1,4 @@
-"""How fast a measured flare replays: a hundred planted ghosts of all sizes, in colour, one core; also Walch's."""
+"""Benchmark of replay speed: a hundred planted ghosts of all sizes, in colour, on one core; and Walch's primitive."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from flarewright.kernels.measure_pupil import SOFT
-from flarewright.measure.numbers import NUMBERS, channel_of
-from flarewright.measure.packed import Packed
-from flarewright.measure.replay import draw_packed, pack
-from flarewright.model.ghost_model import AberrationGhost, BezierGhost, GhostModel
+from flarewright.kernels.ghost_model.pupil_mesh import SOFT
+from flarewright.measure.core.parameter_vector import NUMBERS, channel_of
+from flarewright.measure.replay.ghost_arrays import Packed
+from flarewright.measure.replay.model_image import draw_packed, pack
+from flarewright.model.measurement.ghost_model import AberrationGhost, BezierGhost, GhostModel
 
 SIZE = (960, 540)
 _ANGLES = (4.0, 10.0, 18.0, 25.0)
-# of borders, pixels; fitted ghosts have 0.5 to 3
+# softness of borders, pixels; fitted ghosts have 0.5 to 3
 _SOFT = (0.0, 1.0, 2.5)
 _SHARP = "replay, ghosts a second and core"
 
@@ -25,7 +25,7 @@ def _radius(rng: np.random.Generator) -> float:
 
 
 def planted(count: int = 100, seed: int = 0, soft_px: float = 0.0) -> GhostModel:
-    """Return a model of ghosts of radius 10 to 140 pixels, a little aberrated, with no, one or two rims."""
+    """Return a model of ghosts of radius 10 to 140 pixels, slightly aberrated, with no, one or two rims."""
     rng = np.random.default_rng(seed)
     ghosts = []
     for k in range(count):
@@ -47,7 +47,7 @@ def planted(count: int = 100, seed: int = 0, soft_px: float = 0.0) -> GhostModel
 
 
 def curved(count: int = 100, seed: int = 0) -> GhostModel:
-    """Return a model of as many ghosts by Walch's primitive, as large, whose borders fade inwards over all or part."""
+    """Return a model of equally many and large ghosts with Walch's primitive; their borders fade inwards."""
     rng = np.random.default_rng(seed)
     ghosts = []
     for k in range(count):
@@ -61,9 +61,9 @@ def curved(count: int = 100, seed: int = 0) -> GhostModel:
 
 
 def replay_speed(repeat: int = 5) -> dict[str, Any]:
-    """Return ghosts in colour a second of CPU time, by softness: over the constellations, the best of some runs."""
+    """Return ghosts in colour per second of CPU time, by softness: median over constellations, best of some runs."""
     models = {f"softness {soft_px:g} px" if soft_px else _SHARP: planted(soft_px=soft_px) for soft_px in _SOFT}
-    told: dict[str, Any] = {}
+    reported: dict[str, Any] = {}
     for name, model in (models | {"Walch's primitive": curved()}).items():
         packed = pack(model)
         rates = []
@@ -75,13 +75,13 @@ def replay_speed(repeat: int = 5) -> dict[str, Any]:
                 draw_packed(packed, model, angle, 10.0, SIZE, pool=None)
                 best = min(best, time.process_time() - start)
             rates.append(len(model.ghosts) / best)
-        told |= {name: round(float(np.median(rates))), f"{name}, by angle": [round(x) for x in rates]}
-        told[f"{name}, frames a second on all cores"] = round(_frames(model, packed, repeat), 1)
-    return told
+        reported |= {name: round(float(np.median(rates))), f"{name}, by angle": [round(x) for x in rates]}
+        reported[f"{name}, frames a second on all cores"] = round(_frames(model, packed, repeat), 1)
+    return reported
 
 
 def _frames(model: GhostModel, packed: Packed, repeat: int) -> float:
-    """Return how many frames of the whole model are drawn in a second with the pool's threads, in the median."""
+    """Return the median number of frames of the whole model per second, with the pool's threads."""
     took = []
     for angle in _ANGLES * repeat:
         start = time.perf_counter()

@@ -1,15 +1,17 @@
-"""What ghosts of real prescriptions are like: the numbers of whole ghosts, by tracing their rays.
+"""Statistics of the parameters of whole ghosts of real prescriptions, from traced rays.
 
     python -m benchmarks.measure.terms LENS ... [--f-number 5.6]
 
-`measure.fit.priors` says how large each number may be before a fit has looked at anything. Here it is looked up. Rays
-of every two-reflection path are traced at constellations from the axis to the corner; (x, y) = s f + p g is solved for
-f and g by least squares, p being where a ray passes the iris (of a path that passes it several times, where its rim is
-tightest), and the part of its light that reaches the sensor for the intensity. A path counts where its rays fill the
-iris, at four constellations and more: of one that rims cut to a rest, the numbers of the whole pupil are not told.
+`measure.fitting.ghost_fit.priors` gives the expected size of each parameter before a fit; this program measures it.
+It traces rays of every two-reflection path at constellations from the axis to the corner. It solves (x, y) = s f + p g
+for f and g by least squares, where p is the position of a ray in the iris (for a path with several passes, at the pass
+where its rim is tightest), and fits the light that reaches the sensor for the intensity. A path counts where its rays
+fill the iris at four constellations or more: for a path that rims cut to a small part, the parameters of the whole
+pupil are undetermined.
 
-How far from its rays each form of the map is that a ghost may have is told beside them: f and g polynomials of first or
-second order, alone or over 1 + b v + c w; and by how much blue and red differ from green, by size (`measure.colours`).
+It also prints the residual of each form of the map that a ghost can have: f and g polynomials of first or second order,
+alone or divided by 1 + b v + c w; and the differences of blue and red from green, by size
+(`measure.fitting.colour_prior`).
 """
 
 from __future__ import annotations
@@ -24,31 +26,31 @@ from benchmarks.measure.truth import project_of, rays_of
 from numpy.typing import NDArray
 from synthetic_camera import Setup, poses
 
-from flarewright.measure.numbers import field, ten_terms
-from flarewright.optics.paths import ghost_paths
-from flarewright.render.opening import make_opening
-from flarewright.render.prepare import settle
-from flarewright.render.shots import make_shots
+from flarewright.measure.core.parameter_vector import field, ten_terms
+from flarewright.optics.lens.paths import ghost_paths
+from flarewright.render.scene.opening import make_opening
+from flarewright.render.scene.resolve import resolve_project
+from flarewright.render.scene.shots import make_shots
 
 Floats = NDArray[np.float64]
 
 TERMS = ("1", "u", "v", "w", "uu", "uv", "vv", "uw", "vw", "ww")
-# every so many of a hundred constellations, rays across half the accepted pupil and along it
+# step between constellations (of a hundred), and rays across half the accepted pupil and along it
 _EVERY, _RAYS = 12, (24, 24)
-# how far the mean of u may be from that of a filled iris, and that of p from its middle
+# largest difference of the mean of u from that of a filled iris, and of the mean of p from the centre
 _FILLED, _CENTRED = 0.08, 0.12
 _LEAST = 4
-# of the squares, what keeps numbers that the rays do not tell at 0
+# ridge, part of the squares, that keeps undetermined parameters at 0
 _RIDGE = 1e-6
 _PERCENTILES = (50, 75, 90, 95)
-# of a ghost in a picture 720 pixels wide: colours are told by size
+# limits of size classes for the colour differences, pixels in a picture 720 pixels wide
 _SIZES = (0.0, 6.0, 20.0, 60.0, 150.0, np.inf)
-# forms of the map: how many terms f and g have each, and which of u, v, w stand in what they are divided by
+# forms of the map: number of terms of f and g each, and which of u, v, w are in the divisor
 _FORMS = {
     "first order": (4, ()), "second order": (10, ()), "first order over v, w": (4, (2, 3)),
     "second order over v, w": (10, (2, 3)), "second order over u, v, w": (10, (1, 2, 3)),
 }  # fmt: skip
-# rounds in which what a ray misses is weighed by what it is divided by
+# rounds of reweighting a ray's error by its divisor
 _ROUNDS = 4
 
 
@@ -67,7 +69,7 @@ class _Rays:
         return ten_terms((self.p**2).sum(axis=1), self.p[:, 1] * self.s, self.s**2).T
 
     def maps(self, ten: Floats) -> tuple[Floats, Floats]:
-        """Return what terms of f, and then of g, add across and along the light's direction, (N, 2 K) each."""
+        """Return the columns of the terms of f and of g, across the light's direction and along it, (N, 2 K) each."""
         return (
             np.concatenate([np.zeros_like(ten), self.p[:, :1] * ten], axis=1),
             np.concatenate([self.s[:, None] * ten, self.p[:, 1:] * ten], axis=1),
@@ -85,11 +87,11 @@ class _Seen:
 
 
 def whole_ghosts(setup: Setup, colour: float = 0.5) -> dict[str, _Rays]:
-    """Trace the rays of a lens' whole ghosts, from 0 for the shortest wavelength to 1 for the longest."""
+    """Trace the rays of a lens' whole ghosts; `colour` is 0 for the shortest wavelength and 1 for the longest."""
     seen: dict[str, list[_Seen]] = {}
     largest, per_mm = max(setup.angles_deg), setup.size_px[0] / setup.sensor_width_mm
     for pose in poses(setup)[_EVERY // 3 :: _EVERY]:
-        settled = settle(project_of(setup, pose, "passes"))
+        settled = resolve_project(project_of(setup, pose, "passes"))
         shot = make_shots(settled, make_opening(settled, None))[0]
         for path in ghost_paths(settled.lens):
             rays = rays_of(shot, path, _RAYS, colour)
@@ -104,7 +106,7 @@ def whole_ghosts(setup: Setup, colour: float = 0.5) -> dict[str, _Rays]:
 
 
 def _gathered(seen: list[_Seen]) -> _Rays | None:
-    # light is along y; rays are of the half with x > 0
+    # the light is along y; rays are in the half with x > 0
     reach = [[np.quantile(np.hypot(*each.pupil[:, k].T), 0.98) for k in range(each.pupil.shape[1])] for each in seen]
     at = int(np.argmax(np.mean(reach, axis=0)))
     whole = [each for each in seen if _fills(each.pupil[:, at])]
@@ -118,15 +120,15 @@ def _gathered(seen: list[_Seen]) -> _Rays | None:
 
 
 def terms_of(rays: _Rays) -> Floats:
-    """Return f, g and intensity of a ghost, shape (30,): pixels, and parts of the mean light."""
+    """Return f, g (pixels) and intensity (parts of the mean light) of a ghost, shape (30,)."""
     map_ = _least_squares(np.concatenate(rays.maps(rays.ten)), rays.places.T.ravel())
     return np.concatenate([map_, _least_squares(rays.ten, rays.light / rays.light.mean())])
 
 
 def mapped_by(rays: _Rays, terms: int, below: tuple[int, ...]) -> tuple[float, Floats]:
-    """Return how far from its rays a form of the map is, root mean square, pixels, and the numbers that it divides by.
+    """Return the root mean square residual of a form of the map, pixels, and the coefficients of its divisor.
 
-    Forms as in `_FORMS`; least squares of numerator less place times denominator, weighed by the last denominator.
+    Forms as in `_FORMS`; least squares of numerator minus place times divisor, weighted by the last divisor.
     """
     divides = rays.ten[:, list(below)]
     basis = np.concatenate([
@@ -152,39 +154,39 @@ def _least_squares(basis: Floats, values: Floats) -> Floats:
 
 
 def spread(numbers: Floats, width: int) -> dict[str, Floats]:
-    """Return how large numbers are, shape (paths,) each, in the units of `measure.fit.priors`.
+    """Return the sizes of parameters, shape (paths,) each, in the units of `measure.fitting.ghost_fit.priors`.
 
     Parameters
     ----------
     numbers : ndarray, shape (paths, 30)
     width : int
-        Of the picture, pixels.
+        Width of the picture, pixels.
     """
     size = np.maximum(np.abs(numbers[:, 10]), 0.04 * width)
-    told: dict[str, Floats] = {}
+    reported: dict[str, Floats] = {}
     for letter, at in (("f", 0), ("g", 10)):
         for k, term in enumerate(TERMS):
             of_width = term in ("1", "w")
-            told[f"{letter} {term}, of {'width' if of_width else 'size'}"] = np.abs(numbers[:, at + k]) / (
+            reported[f"{letter} {term}, of {'width' if of_width else 'size'}"] = np.abs(numbers[:, at + k]) / (
                 width if of_width else size
             )
     for k, term in enumerate(TERMS[1:], 1):
-        told[f"intensity {term}"] = np.abs(numbers[:, 20 + k] / numbers[:, 20])
-    return told
+        reported[f"intensity {term}"] = np.abs(numbers[:, 20 + k] / numbers[:, 20])
+    return reported
 
 
 def differences(setup: Setup) -> Floats:
-    """Return green's size and by how much f and g of blue and red differ from green's, pixels, shape (N, 21)."""
+    """Return green's size and the differences of f and g of blue and red from green's, pixels, shape (N, 21)."""
     blue, green, red = ({name: terms_of(rays) for name, rays in whole_ghosts(setup, at).items()} for at in (0, 0.5, 1))
-    told = [
+    reported = [
         np.concatenate([green[name][10:11], other[name][:20] - green[name][:20]])
         for other in (blue, red) for name in sorted(green.keys() & other.keys())
     ]  # fmt: skip
-    return np.abs(np.array(told).reshape(-1, 21))
+    return np.abs(np.array(reported).reshape(-1, 21))
 
 
 def main() -> None:
-    """Print the percentiles of each number over the paths of all lenses."""
+    """Print the percentiles of each parameter over the paths of all lenses."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.measure.terms", description=__doc__)
     parser.add_argument("lens", nargs="+")
     parser.add_argument("--f-number", type=float, default=5.6)
@@ -197,13 +199,13 @@ def main() -> None:
         print(f"{name:24}", "  ".join(f"{value:7.3f}" for value in np.percentile(values, _PERCENTILES)))
     for name, (terms, below) in _FORMS.items():
         off, divides = zip(*(mapped_by(rays, terms, below) for rays in ghosts), strict=True)
-        told = {f"{name}, px": np.array(off)}
-        told |= {f"  by {TERMS[k]}": np.abs([each[n] for each in divides]) for n, k in enumerate(below)}
-        for row, values in told.items():
+        reported = {f"{name}, px": np.array(off)}
+        reported |= {f"  by {TERMS[k]}": np.abs([each[n] for each in divides]) for n, k in enumerate(below)}
+        for row, values in reported.items():
             print(f"{row:32}", "  ".join(f"{value:7.3f}" for value in np.percentile(values, _PERCENTILES)))
 
     apart = np.concatenate([differences(setup) for setup in setups])
-    # as many pixels as in a picture 720 wide
+    # scale to a picture 720 pixels wide
     apart *= 720.0 / setups[0].size_px[0]
     for least, most in pairwise(_SIZES):
         some = apart[(apart[:, 0] >= least) & (apart[:, 0] < most)]

@@ -1,4 +1,4 @@
-"""What is true of each ghost of a synthetic capture: where it is, how bright, and what makes it hard."""
+"""Truth about each ghost of a synthetic capture: position, brightness and difficulty."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flarewright.kernels.trace import ALIVE, REL, STOP_X, WEIGHT, X, Y
-from flarewright.optics.bundle import trace_points
-from flarewright.optics.paths import LightPath, ghost_paths
-from flarewright.optics.region import find_region
-from flarewright.render.opening import make_opening
-from flarewright.render.prepare import settle
-from flarewright.render.shot import Shot
-from flarewright.render.shots import make_shots
+from flarewright.kernels.tracing.sequential import ALIVE, REL, STOP_X, WEIGHT, X, Y
+from flarewright.optics.lens.paths import LightPath, ghost_paths
+from flarewright.optics.rays.bundle import trace_points
+from flarewright.optics.rays.pupil_region import find_region
+from flarewright.render.scene.opening import make_opening
+from flarewright.render.scene.resolve import resolve_project
+from flarewright.render.scene.shot import Shot
+from flarewright.render.scene.shots import make_shots
 
 sys.path.append(str(Path(__file__).parents[2] / "tests" / "measure"))
 
@@ -25,22 +25,22 @@ from synthetic_camera import Pose, Setup, ghost_layers, project_of
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# rays across half the accepted pupil and along it, which tell its shape and its folds
+# rays across half the accepted pupil and along it, to detect its shape and folds
 _RAYS = (48, 96)
 _LEAST_RAYS = 30
-# part of the pupil that must land turned over for a fold
+# least part of the pupil that lands inverted in a fold
 FOLD = 0.02
-# a rim is one of several that cut a ghost when it stops this part of the rays just outside the open pupil
+# least part of the rays just outside the open pupil that a rim must stop to count as a bounding rim
 CUT = 0.05
-# another ghost's light over a ghost's own, and the part of the ghost where it is exceeded, that make a crossing
+# a crossing: least ratio of other ghosts' light to the ghost's, and least part of the ghost with that ratio
 CROSSING_LIGHT, CROSSING_PART = 1.0, 0.5
-# ghosts below this part of green's noise are not kept
+# ghosts below this part of green's noise are dropped
 _FAINTEST = 1.0
 
 
 @dataclass(frozen=True)
 class TrueGhost:
-    """One path of one constellation.
+    """One path at one constellation.
 
     Attributes
     ----------
@@ -48,13 +48,13 @@ class TrueGhost:
     window : tuple of int
         Left, top, width, height of `mask`, pixels.
     mask : ndarray of bool, shape (height, width)
-        Its footprint: where green is more than half of the median of what is lit.
+        Footprint: where green is more than half of the median of the lit pixels.
     light : ndarray, shape (ceil(height / 2), ceil(width / 2)), float16
         Green over `level`, at half the resolution.
     level, snr : float
-        Median green radiance there, and over the median noise there.
+        Median green radiance in the footprint, and its ratio to the median noise.
     fold, cut, at_edge, crossing : bool
-        Part of it lands turned over; more than one rim bounds it; the picture cuts it; others are as bright over much
+        Part of it is inverted; more than one rim bounds it; the picture cuts it; other ghosts are as bright over much
         of it.
     """
 
@@ -75,7 +75,7 @@ class TrueGhost:
 
 
 def footprint(green: Floats) -> tuple[tuple[int, int, int, int], Mask, float] | None:
-    """Return window, mask and level of a ghost's picture; None when it is dark."""
+    """Return window, mask and level of a ghost's image; None when it is dark."""
     lit = green[green > 1e-3 * float(green.max(initial=0.0))]
     if lit.size < 4:
         return None
@@ -87,7 +87,7 @@ def footprint(green: Floats) -> tuple[tuple[int, int, int, int], Mask, float] | 
 
 
 def true_ghosts(setup: Setup, pose: Pose, scale: float, sigma: NDArray[np.float32]) -> list[TrueGhost]:
-    """Return the truth of every ghost that noise does not hide, brightest first."""
+    """Return the truth about every ghost above the noise, brightest first."""
     images = {name: image[..., 1] for name, image in ghost_layers(setup, pose, scale)}
     total = sum(images.values(), np.zeros(setup.size_px[::-1]))
     forms = forms_of(setup, pose)
@@ -111,14 +111,14 @@ def true_ghosts(setup: Setup, pose: Pose, scale: float, sigma: NDArray[np.float3
 
 
 def cut_by_frame(window: tuple[int, int, int, int], size_px: tuple[int, int]) -> bool:
-    """Tell whether a footprint ends at the border of the picture."""
+    """Return whether a footprint ends at the border of the picture."""
     left, top, width, height = window
     return left == 0 or top == 0 or left + width == size_px[0] or top + height == size_px[1]
 
 
 def forms_of(setup: Setup, pose: Pose) -> dict[str, tuple[bool, bool]]:
-    """Tell of every path, or of the setup's own, whether it folds, and whether several rims bound it."""
-    settled = settle(project_of(setup, pose, "passes"))
+    """Return for every path (of the setup, if it names any) whether it folds, and whether several rims bound it."""
+    settled = resolve_project(project_of(setup, pose, "passes"))
     shot = make_shots(settled, make_opening(settled, None))[0]
     paths = [path for path in ghost_paths(settled.lens) if not setup.paths or path.name in setup.paths]
     return {path.name: form for path in paths if (form := _form(shot, path)) is not None}
@@ -126,15 +126,15 @@ def forms_of(setup: Setup, pose: Pose) -> dict[str, tuple[bool, bool]]:
 
 @dataclass(frozen=True)
 class PathRays:
-    """Rays of one path over the half of the accepted pupil right of the plane of the light, shape (N,) each.
+    """Rays of one path over half of the accepted pupil, right of the plane of the light, shape (N,) each.
 
     Attributes
     ----------
     passes : ndarray of bool
-        Which reach the sensor through the iris.
+        Whether a ray reaches the sensor through the iris.
     stops : ndarray, shape (N, passes of the iris, 2)
     x, y, weight : ndarray
-        Where they land, mm, and how much of their light does.
+        Positions on the sensor, mm, and transmitted part of the light.
     """
 
     passes: Mask
@@ -145,9 +145,9 @@ class PathRays:
 
 
 def rays_of(shot: Shot, path: LightPath, count: tuple[int, int], colour: float = 0.5) -> PathRays | None:
-    """Trace rays on a grid, row by row along the light's plane; None where too few reach the sensor to tell a form.
+    """Trace rays on a grid, row by row along the light's plane; None where too few reach the sensor.
 
-    `colour` is from 0 for the shortest wavelength to 1 for the longest.
+    `colour` is 0 for the shortest wavelength and 1 for the longest.
     """
     tilt, radius = shot.incidence.tilt, shot.opening.radius
     region = find_region(shot.packed, path, tilt, radius, shot.view_radius)
@@ -175,14 +175,14 @@ def _form(shot: Shot, path: LightPath) -> tuple[bool, bool] | None:
     whole = open_[1:, 1:] & open_[1:, :-1] & open_[:-1, 1:] & open_[:-1, :-1]
     turned = np.diff(x, axis=1)[:-1] * np.diff(y, axis=0)[:, :-1] - np.diff(y, axis=1)[:-1] * np.diff(x, axis=0)[:, :-1]
     over = float(np.mean(turned[whole] > 0.0)) if whole.any() else 0.0
-    # each time that the iris is passed it bounds by itself; glass is what stops the others
+    # each pass of the iris counts as a separate rim; glass stops the other rays
     reach = np.hypot(rays.stops[..., 0], rays.stops[..., 1])
     stopped_by = np.where(reach.max(axis=1) > shot.opening.radius, np.argmax(reach, axis=1), rays.stops.shape[1])
     return min(over, 1.0 - over) > FOLD, _bounded_by(open_, stopped_by.reshape(grid)) > 1
 
 
 def _bounded_by(open_: Mask, stopped_by: NDArray[np.int64]) -> int:
-    """Return how many rims stop the rays just outside an open pupil."""
+    """Return the number of rims that stop the rays just outside an open pupil."""
     padded = np.pad(open_, 1)
     beside = padded[:-2, 1:-1] | padded[2:, 1:-1] | padded[1:-1, :-2] | padded[1:-1, 2:]
     count = np.bincount(stopped_by[beside & ~open_])

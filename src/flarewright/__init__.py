@@ -10,10 +10,10 @@ Names are imported when they are first used, so `import flarewright` costs nothi
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ._version import __version__ as __version__
+from .lazy import lazy_names
 
 if TYPE_CHECKING:
     from .errors import FlarewrightError as FlarewrightError
@@ -21,23 +21,26 @@ if TYPE_CHECKING:
     from .errors import LensError as LensError
     from .errors import OutputError as OutputError
     from .errors import ProjectError as ProjectError
-    from .io.coating_text import parse_coating_choice as parse_coating_choice
-    from .io.exr import write_exr as write_exr
-    from .io.half import exr_scale as exr_scale
-    from .io.look_file import read_look as read_look
-    from .io.project_file import read_project as read_project
-    from .measure.rendering import render_measured as render_measured
+    from .io.images.exr import write_exr as write_exr
+    from .io.images.half import exr_scale as exr_scale
+    from .io.lens.coating_text import parse_coating_choice as parse_coating_choice
+    from .io.project.look_file import read_look as read_look
+    from .io.project.project_file import read_project as read_project
+    from .measure.replay.measured_project import render_measured as render_measured
     from .model import D65 as D65
     from .model import Art as Art
     from .model import AsLens as AsLens
     from .model import Bare as Bare
     from .model import BlackBody as BlackBody
+    from .model import Bounds as Bounds
     from .model import Camera as Camera
     from .model import Coating as Coating
     from .model import CoatingChoice as CoatingChoice
+    from .model import Design as Design
     from .model import EqualEnergy as EqualEnergy
     from .model import Everywhere as Everywhere
     from .model import Film as Film
+    from .model import GhostTarget as GhostTarget
     from .model import InTurn as InTurn
     from .model import Iris as Iris
     from .model import Layer as Layer
@@ -65,48 +68,39 @@ if TYPE_CHECKING:
     from .model import Tabulated as Tabulated
     from .render.analysis import ghosts as ghosts
     from .render.analysis import paraxial as paraxial
-    from .render.looks import look_of as look_of
-    from .render.looks import with_look as with_look
-    from .render.photographed import as_photographed as as_photographed
-    from .render.prepare import load_lens as load_lens
     from .render.render import Rendering as Rendering
     from .render.render import render as render
+    from .render.scene.looks import look_of as look_of
+    from .render.scene.looks import with_look as with_look
+    from .render.scene.photographic_defaults import as_photographed as as_photographed
+    from .render.scene.resolve import load_lens as load_lens
 
 _HOMES = {
     ".errors": ("FlarewrightError", "GlassError", "LensError", "OutputError", "ProjectError"),
     ".model": (
-        "D65", "Art", "AsLens", "Bare", "BlackBody", "Camera", "Coating", "CoatingChoice", "EqualEnergy", "Everywhere",
-        "Film", "InTurn", "Iris", "Layer", "Lens", "Light", "Lines", "Look", "Medium", "Output", "PerRow", "Polygon",
+        "D65", "Art", "AsLens", "Bare", "BlackBody", "Bounds", "Camera", "Coating", "CoatingChoice", "Design",
+        "EqualEnergy", "Everywhere", "Film", "GhostTarget", "InTurn", "Iris",
+        "Layer", "Lens", "Light", "Lines", "Look", "Medium", "Output", "PerRow", "Polygon",
         "Preset", "Project", "Quality", "QuarterWave", "Rectangle", "Rgb", "RowScatter", "Rule", "Scatter", "Stack",
         "Standard", "Stop", "Surface", "Tabulated",
     ),
-    ".io.coating_text": ("parse_coating_choice",),
-    ".io.exr": ("write_exr",),
-    ".io.look_file": ("read_look",),
-    ".io.half": ("exr_scale",),
-    ".io.project_file": ("read_project",),
-    ".measure.rendering": ("render_measured",),
+    ".io.lens.coating_text": ("parse_coating_choice",),
+    ".io.images.exr": ("write_exr",),
+    ".io.project.look_file": ("read_look",),
+    ".io.images.half": ("exr_scale",),
+    ".io.project.project_file": ("read_project",),
+    ".measure.replay.measured_project": ("render_measured",),
     ".render.analysis": ("ghosts", "paraxial"),
-    ".render.looks": ("look_of", "with_look"),
-    ".render.photographed": ("as_photographed",),
-    ".render.prepare": ("load_lens",),
+    ".render.scene.looks": ("look_of", "with_look"),
+    ".render.scene.photographic_defaults": ("as_photographed",),
+    ".render.scene.resolve": ("load_lens",),
     ".render.render": ("Rendering",),
     # The package itself, which may be called: a function of its name could not live beside it.
     "": ("render",),
 }  # fmt: skip
-_HOME = {name: home for home, names in _HOMES.items() for name in names}
+_names, __getattr__, _ = lazy_names(__name__, _HOMES)
 
-__all__ = ["__version__", *sorted(_HOME)]  # noqa: PLE0604
-
-
-def __getattr__(name: str) -> Any:
-    home = _HOME.get(name)
-    if home is None:
-        raise AttributeError(f"module 'flarewright' has no attribute {name!r}")
-    module = import_module(home or f".{name}", __name__)
-    value = getattr(module, name) if home else module
-    globals()[name] = value
-    return value
+__all__ = ["__version__", *_names]  # noqa: PLE0604
 
 
 def __dir__() -> list[str]:

@@ -1,11 +1,12 @@
-"""What Flarewright says when a person's input cannot be used.
+"""Exceptions for input that cannot be used, and helpers that raise them.
 
-Every message is one sentence that tells what is wrong, where, and what to do about it.
-The command line prints it and ends with exit code 2; a library user catches `FlarewrightError`.
+Every message is one sentence that says what is wrong, where, and how to fix it.
+The command line prints it and exits with code 2; a library user catches `FlarewrightError`.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
@@ -13,29 +14,48 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+# input of the user in quotation marks; an apostrophe follows a letter
+_LONG_QUOTE = re.compile(r"""(?<!\w)(['"])(?:(?!\1).){121,}\1(?!\w)""", re.DOTALL)
+# longer than a file name
+_LONG_WORD = re.compile(r"[^\s/\\]{256,}")
+
+
+def _readable(message: str) -> str:
+    """Return a message with quoted input and words longer than a file name cut in the middle to 120 characters."""
+
+    def cut(found: re.Match[str]) -> str:
+        text = found[0]
+        return f"{text[:100]} ... {text[-15:]}"
+
+    return _LONG_WORD.sub(cut, _LONG_QUOTE.sub(cut, message))
+
 
 class FlarewrightError(Exception):
-    """A mistake in what a person gave; the message says what, where, and the remedy.
+    """Invalid input from the user; the message says what, where, and the remedy.
 
     Parameters
     ----------
     message : str
-        One sentence for a person.
+        One sentence for the user.
     problems : tuple of str, optional
-        Every single finding, each with its row, when there are several.
+        All findings, each with its row, when there are several.
     """
 
     def __init__(self, message: str, problems: tuple[str, ...] = ()) -> None:
-        super().__init__(message)
-        self.problems = problems
+        super().__init__(_readable(message))
+        self.problems = tuple(map(_readable, problems))
+
+
+class FileError(FlarewrightError, ValueError):
+    """A file that cannot be opened, exceeds the limit on memory, or that a library cannot read."""
 
 
 class LensError(FlarewrightError):
-    """A lens file that cannot be read or is no camera lens."""
+    """A lens file that cannot be read or does not describe a camera lens."""
 
 
 class GlassError(FlarewrightError):
-    """A glass that no catalogue knows, or a wavelength it is not known for."""
+    """A glass that is in no catalogue, or a wavelength outside the glass's range."""
 
 
 class ProjectError(FlarewrightError):
@@ -43,17 +63,17 @@ class ProjectError(FlarewrightError):
 
 
 class OutputError(FlarewrightError):
-    """A file that could not be written; nothing was left half-written."""
+    """A file that could not be written; no partial file remains."""
 
 
 @contextmanager
 def naming(file: str | PathLike[str]) -> Iterator[None]:
-    """Let whatever is refused within name the file that it comes from.
+    """Prepend the file name to the message of any `FlarewrightError` raised inside the block.
 
     Parameters
     ----------
     file : path
-        Begins the message of an error that does not name it already.
+        The file being read. Messages that already contain its name stay as they are.
     """
     try:
         yield
@@ -66,19 +86,20 @@ def naming(file: str | PathLike[str]) -> Iterator[None]:
 def optional(
     module: str, extra: str, what: str, *, kind: type[FlarewrightError] = FlarewrightError, hint: str = ""
 ) -> Any:
-    """Import a module of a package that is not installed with Flarewright itself.
+    """Import a module of an optional package.
 
     Parameters
     ----------
     module : str
-        Like "astral.sun".
+        Such as "astral.sun".
     extra : str
-        Which installs the package.
+        The extra of Flarewright that installs the package.
     what : str
-        Needs it; begins the message.
+        The feature that needs it; the message starts with it.
     kind : type of FlarewrightError
+        Class of the exception.
     hint : str
-        Ends the message.
+        Text at the end of the message.
 
     Returns
     -------
@@ -87,7 +108,7 @@ def optional(
     Raises
     ------
     FlarewrightError
-        Of the given kind, when the package is not there.
+        The package is not installed; of class `kind`.
     """
     try:
         return import_module(module)

@@ -1,4 +1,4 @@
-"""Whatever a person gives wrong: exit code 2 and one clear sentence, never a traceback, nothing half-written."""
+"""Invalid input of any kind: exit code 2 and one clear sentence, no traceback, no partial files."""
 
 import json
 
@@ -17,7 +17,7 @@ LENS = f'schema_version = 1\nname = "Singlet"\nf_number = 5.0\n{ROWS}'
 
 
 def lens(**changes):
-    """The good lens file with texts replaced."""
+    """Return the valid lens file with texts replaced."""
     text = LENS
     for old, new in changes.values():
         assert old in text
@@ -158,9 +158,9 @@ PROJECT_FILES = {
     ),
     "a row that scatters twice": (
         PROJECT + "[scatter]\n[[scatter.rows]]\nrow = 1\n[[scatter.rows]]\nrow = 1\n",
-        "row 1 is told 2 times",
+        "row 1 appears 2 times",
     ),
-    "more scatter than light": (PROJECT + '[scatter]\nmodel = "abg"\nabg = [5, 0.001, 2]\n', "take less"),
+    "more scatter than light": (PROJECT + '[scatter]\nmodel = "abg"\nabg = [5, 0.001, 2]\n', "reduce it"),
     "negative dust": (PROJECT + "[dirt]\ndust_per_mm2 = -1\n", "dirt.dust_per_mm2"),
     "dust sizes upside down": (PROJECT + "[dirt]\ndust_um = [50, 5]\n", "least diameter"),
     "opaque fingerprint": (PROJECT + "[dirt]\nfingerprint = 1.5\n", "dirt.fingerprint"),
@@ -245,7 +245,7 @@ COMMAND_LINES = {
     "holdout that is not there": ([*H, *GOOD, "--holdout", "no.png"], "--holdout no.png does not exist"),
     "depth that is not there": ([*H, *GOOD, "--depth", "no.exr"], "--depth no.exr does not exist"),
     "holdout and depth": (
-        [*H, *GOOD, "--holdout", "no.png", "--depth", "no.exr"], "--holdout and --depth both say what hides"),
+        [*H, *GOOD, "--holdout", "no.png", "--depth", "no.exr"], "--holdout and --depth both hide lights"),
     "rays from the moon": (
         [*H, *GOOD, *REF, "--rays-from", "moon"], "--rays-from should be 'auto', 'light' or 'camera'"),
     "sun nowhere": ([*H, "--light", "sun", "-o", "a.exr"], "--light sun@10,5"),
@@ -256,7 +256,7 @@ COMMAND_LINES = {
     "one size too many beside a sun": (
         [*H, "--light", "sun@1,1", *GOOD, *["--light-size", "3x2"] * 2], "is given 2 times for 1 other light;"),
     "disc and rectangle": (
-        [*H, *GOOD, "--light-size", "3x2", "--light-diameter", "1"], "each say how large a light is; give one"),
+        [*H, *GOOD, "--light-size", "3x2", "--light-diameter", "1"], "each set the shape of lights; give one"),
     "polygon of two corners": ([*H, *GOOD, "--light-polygon", "0,0 1,0"], "has 2 corners; give three or more"),
     "polygon of words": ([*H, *GOOD, "--light-polygon", "0,0 1,0 x,1"], "--light-polygon 'x,1' is not two numbers"),
     "polygon that crosses itself": (
@@ -342,14 +342,18 @@ COMMAND_LINES = {
     "time nan": ([*H, *GOOD, *REF, "--time-limit", "nan"], "--time-limit nan is no time"),
     "time for final quality": ([*H, *GOOD, "--time-limit", "5"], "works with --quality reference only"),
     "resume from nothing": ([*H, *GOOD, *REF, "--resume", "no.npz"], "no.npz does not exist"),
-    "resume from a lens": ([*H, *GOOD, *REF, "--resume", "lens.toml"], "no state file of a reference render"),
+    "resume from a lens": ([*H, *GOOD, *REF, "--resume", "lens.toml"], "read as a state file of a reference render"),
     "size is one number": ([*H, *GOOD, "--size", "640"], "--size '640'"),
     "size is not whole": ([*H, *GOOD, "--size", "640.5x480"], "whole numbers"),
     "size zero": ([*H, *GOOD, "--size", "0x480"], "--size: 0x480"),
     "size huge": ([*H, *GOOD, "--size", "99999x99999"], "32768"),
     "sensor negative": ([*H, *GOOD, "--sensor", "-36x24"], "above 0 mm"),
+    "disc tiny": ([*H, *GOOD, "--light-diameter", "1e-9"], "at least 1e-06 degrees, not 1e-09; 0 is a point"),
+    "rectangle tiny": ([*H, *GOOD, "--light-size", "1e-9x1"], "1e-06"),
+    "polygon tiny": ([*H, *GOOD, "--light-polygon", "0,0 1e-9,0 0,1e-9"], "has no area"),
+    "sensor tiny": ([*H, *GOOD, "--sensor", "1e-308x24"], "too small for a sensor; give at least 0.001 mm a side"),
     "sensor of an airfield": (
-        [*H, *GOOD, "--sensor", "1e9x1e9"], "--sensor: 1e+09x1e+09 mm is no sensor; give at most"),
+        [*H, *GOOD, "--sensor", "1e9x1e9"], "--sensor: 1e+09x1e+09 mm is too large for a sensor; give at most"),
     "pixels like fields": (
         [*H, *GOOD, "--ideal", "--sensor", "1e6x1e6", "--size", "64x36", "--quality", "draft"],
         "pixels of 2.78e+04 mm are too coarse for the starburst, whose core has 0.084 mm; give a smaller --sensor"),
@@ -366,7 +370,7 @@ COMMAND_LINES = {
     "unknown paths": ([*H, *GOOD, "--paths", "some"], "--paths"),
     "ghosts of a light behind": (["ghosts", "heliar-tronnier", "--light", "1,1", "--distance", "-3"], "--distance"),
     "a sensor's ghost of no row": (
-        ["lens", "show", "heliar-tronnier", "--plot", "a.svg", "--ghost", "sensor-99"], "sensor-99 is no ghost",
+        ["lens", "show", "heliar-tronnier", "--plot", "a.svg", "--ghost", "sensor-99"], "sensor-99 is not a ghost",
     ),
     "focus behind": ([*H, *GOOD, "--focus", "-10"], "--focus"),
     "threads zero": ([*H, *GOOD, "--threads", "0"], "--threads"),
@@ -379,7 +383,6 @@ COMMAND_LINES = {
     "polish is nan": ([*H, *GOOD, "--surface-roughness", "nan"], "--surface-roughness"),
     "cleaner than clean": ([*H, *GOOD, "--cleanliness", "0"], "--cleanliness"),
     "scatter without glare": ([*G, "--scatter", "abg"], "add --glare"),
-    # the ghosts are traced before the glare is refused: a singlet has one
     "glare of unknown scatter": (
         ["ghosts", "lens.toml", "--light", "1,1", "--glare", "--scatter", "fog"], "--scatter should be"),
     "glare of negative polish": (
@@ -401,8 +404,8 @@ COMMAND_LINES = {
     "filter without thickness": ([*H, *GOOD, "--filter", "N-BK7"], "--filter 'N-BK7' is no plate"),
     "filter of no glass": (
         [*H, *GOOD, "--filter", "UNOBTAINIUM:2"],
-        "'UNOBTAINIUM' is not in the catalogue: give n_d and v_d instead (on the command line an index in the name's "
-        "place",
+        "'UNOBTAINIUM' is not in the catalogue: give n_d and v_d instead (on the command line an index can replace "
+        "the name",
     ),
     "filter of no thickness": ([*H, *GOOD, "--filter", "N-BK7:0"], "--filter 'N-BK7:0'"),
     "filter of thin air": ([*H, *GOOD, "--filter", "1.0:2"], "--filter '1.0:2'"),
@@ -421,35 +424,35 @@ COMMAND_LINES = {
     "zoom to nan": (["render", "canon-70-200", *GOOD, "--zoom", "nan"], "not to nan mm"),
     "squeeze of nothing": ([*H, *GOOD, "--squeeze", "0"], "--squeeze"),
     "ghosts of a bright sensor": (["ghosts", "heliar-tronnier", "--light", "1,1", "--sensor-reflectance", "2"],
-                                  "no part of the light"),
+                                  "--sensor-reflectance should be less than or equal to 1"),
     "ghosts zoomed": (["ghosts", "heliar-tronnier", "--light", "1,1", "--zoom", "9"], "has no positions"),
     "show zoomed": (["lens", "show", "heliar-tronnier", "--zoom", "9"], "has no positions"),
     "several at once": ([*H, *GOOD, "--fstop", "0", "--quality", "best"], "2 settings cannot be used"),
-    "ghosts of three orders": (["ghosts", "heliar-tronnier", "--light", "1,1", "--orders", "3"], "choose 2 or 4"),
+    "ghosts of three orders": (["ghosts", "heliar-tronnier", "--light", "1,1", "--orders", "3"], "should be 2 or 4"),
     "ghosts below no limit": (["ghosts", "heliar-tronnier", "--light", "1,1", "--orders", "4", "--order4-limit", "nan"],
-                              "--order4-limit nan is no part"),
+                              "--order4-limit should be a finite number"),
     "focus and sensor distance": (
-        [*H, *GOOD, "--focus", "900", "--sensor-distance", "80"], "--focus and --sensor-distance both say where"),
+        [*H, *GOOD, "--focus", "900", "--sensor-distance", "80"], "--focus and --sensor-distance both place"),
     "blades beside an iris image": (
         [*H, *GOOD, "--iris-image", "picture.png", "--blades", "5"], "--blades shapes blades and"),
-    "exposure of no PNG": ([*H, *GOOD, "--no-png", "--exposure", "1"], "--exposure is for the PNG alone"),
-    "view of no PNG": ([*H, *GOOD, "--no-png", "--view", "srgb"], "--view is for the PNG alone"),
+    "exposure of no PNG": ([*H, *GOOD, "--no-png", "--exposure", "1"], "--exposure is for the PNG and"),
+    "view of no PNG": ([*H, *GOOD, "--no-png", "--view", "srgb"], "--view is for the PNG and"),
     "ghosts of two lights": ([*G, "--light", "2,2"], "--light is given 2 times; ghosts are listed for one light"),
     "ghosts focused twice": ([*G, "--focus", "900", "--sensor-distance", "80"], "keep one"),
     "iris image is a folder": ([*H, *GOOD, "--iris-image", "folder.exr"], "--iris-image folder.exr is a folder; give"),
-    "output below a file": ([*H, "--light", "1,1", "-o", "lens.toml/a.exr"], "lens.toml is a file and no folder"),
+    "output below a file": ([*H, "--light", "1,1", "-o", "lens.toml/a.exr"], "lens.toml is a file, not a folder"),
     "output without a name": ([*H, "--light", "1,1", "-o", ""], "the name of the output is empty"),
     "output is the folder above": ([*H, "--light", "1,1", "-o", ".."], "cannot write ..: it is a folder"),
     "output is an ending": ([*H, "--light", "1,1", "-o", ".exr"], "an ending without a name; write flare.exr"),
     "ghosts without a light": (["ghosts", "heliar-tronnier"], "missing option '--light'"),
     "ghosts in X-rays": (["ghosts", "heliar-tronnier", "--light", "1,1", "--wavelength-nm", "1"], "not visible"),
     "ghosts too fast": (["ghosts", "heliar-tronnier", "--light", "1,1", "--fstop", "1"], "f/1 is faster"),
-    "ghosts of unknown paths": (["ghosts", "heliar-tronnier", "--light", "1,1", "--paths", "x"], "--paths 'x'"),
+    "ghosts of unknown paths": (["ghosts", "heliar-tronnier", "--light", "1,1", "--paths", "x"], "--paths should be"),
     "show nothing": (["lens", "show"], "missing argument"),
     "show an unknown lens": (["lens", "show", "summicron"], "neither a shipped lens nor a file"),
     "show a ghost that is words": (["lens", "show", "heliar-tronnier", "--ghost", "bright"], "J-I"),
     "draw a ghost of the stop": (
-        ["lens", "show", "heliar-tronnier", "--plot", "a.svg", "--ghost", "5-1"], "5-1 is no ghost"),
+        ["lens", "show", "heliar-tronnier", "--plot", "a.svg", "--ghost", "5-1"], "5-1 is not a ghost"),
     "draw into no folder": (["lens", "show", "heliar-tronnier", "--plot", "no/a.svg"], "does not exist"),
     "convert onto itself": (["lens", "convert", "lens.toml", "lens.toml"], "is the file to convert"),
     "convert onto another file": (["lens", "convert", "heliar-tronnier", "lens.toml"], "replace it with --force"),
@@ -479,7 +482,7 @@ def refuse(capsys, folder, words, *keywords):
     assert len(sentences) == 1, err
     assert "Traceback" not in out + err
     assert not sentences[0].endswith((".", ":", ";", ",")), sentences[0]
-    # Below the sentence stands at most the list of all findings.
+    # Below the sentence there is at most the list of all findings.
     assert all(line.startswith("  - ") for line in lines[lines.index(sentences[0]) + 1 :])
     for keyword in keywords:
         assert keyword in err
@@ -492,7 +495,7 @@ def test_lens_files(capsys, folder, case):
     text, keyword = LENS_FILES[case]
     (folder / "bad.toml").write_text(text)
     out = refuse(capsys, folder, ["lens", "check", "bad.toml"], keyword)
-    assert out.startswith("bad.toml: refused")
+    assert out.startswith("bad.toml: rejected")
     assert refuse(capsys, folder, ["render", "bad.toml", "--light", "1,1", "-o", "a.exr"], keyword) == ""
 
 
@@ -529,16 +532,16 @@ def test_every_finding_of_a_lens_file_is_listed_with_its_row(capsys, folder):
     assert capsys.readouterr().err.count("  - ") >= 2
 
 
-def test_one_bad_file_among_good_ones_is_told_and_the_others_are_checked(capsys, folder):
+def test_one_bad_file_is_reported_and_the_others_are_checked(capsys, folder):
     (folder / "bad.toml").write_text("")
     assert run(["lens", "check", "lens.toml", "bad.toml", "heliar-tronnier"]) == 2
     out, err = capsys.readouterr()
     assert [line.split(":")[1].split(",")[0] for line in out.splitlines() if line[0] != " "] == [
-        " usable", " refused", " usable"]  # fmt: skip
-    assert "1 of 3 lens files were refused" in err
+        " usable", " rejected", " usable"]  # fmt: skip
+    assert "1 of 3 lens files were rejected" in err
 
 
-def test_every_mistake_of_a_project_is_told_at_once(capsys, folder):
+def test_all_errors_of_a_project_are_listed(capsys, folder):
     text = PROJECT + "intensity = -1\ndiameter_deg = 2\nshape = { kind = 'rectangle', size_deg = [2, 1] }\n"
     text += "[camera]\nsize_px = [0, 10]\n[iris]\nblades = 2\n[quality]\nwavelengths = 0\n"
     (folder / "bad.toml").write_text(text)
@@ -549,7 +552,7 @@ def test_every_mistake_of_a_project_is_told_at_once(capsys, folder):
     assert err.count("  - ") == 5
 
 
-def test_what_a_render_would_refuse_is_told_together(capsys, folder):
+def test_errors_of_a_render_are_listed_together(capsys, folder):
     text = 'coating = "preset:gold"\n' + PROJECT + '[iris]\nmask = "no.png"\n[dirt]\nimage = "nor.png"\n'
     (folder / "bad.toml").write_text(text + '[[art.rules]]\nselect = "5-1"\n')
     refuse(capsys, folder, ["project", "check", "bad.toml"], "bad.toml has 4 problems, the first: ", "  - ")

@@ -1,4 +1,4 @@
-"""Every command does what its help says: one JSON object on stdout, words on stderr, whole files or none."""
+"""Every command does what its help says: one JSON object on stdout, text on stderr, complete files or none."""
 
 import json
 import os
@@ -19,9 +19,9 @@ from typer.main import get_command
 import flarewright as fw
 from flarewright import __version__
 from flarewright.cli.app import app, run
-from flarewright.io.exr import read_exr
-from flarewright.io.library import shipped
-from flarewright.io.project_file import project_from_data, read_project
+from flarewright.io.images.exr import read_exr
+from flarewright.io.lens.library import library_names
+from flarewright.io.project.project_file import project_from_data, read_project
 from flarewright.model import (
     AsLens,
     Bare,
@@ -75,7 +75,7 @@ class FakeRendering:
 
 @pytest.fixture
 def projects(monkeypatch):
-    """Replace the renderer by one that notes what it was asked for."""
+    """Replace the renderer by one that records its project."""
     seen = []
 
     def fake(project, **options):
@@ -93,7 +93,7 @@ def projects(monkeypatch):
 # render
 
 
-def test_render_writes_exr_and_preview_and_tells(capsys, projects, folder):
+def test_render_writes_exr_and_preview_and_reports_them(capsys, projects, folder):
     said = call(capsys, "render", "heliar-tronnier", "--ideal", "--light", "-3,4", "--size", "8x6", "-o", "a.exr")
     assert said.out == ""
     assert said.err.splitlines()[0] == "flarewright: a remark"
@@ -136,7 +136,7 @@ def test_every_flag_reaches_the_project(capsys, projects, folder):
         "--full-windows", "--exposure", "-2", "--view", "filmic", "--threads", "1", "--seed", "5", "--error", "0.1",
         "--error-of", "total", "--samples", "1000", "--orders", "4", "--order4-limit", "1e-5", "-o", "a.exr",
     )  # fmt: skip
-    # what would leave others of these without effect
+    # options that would make others ineffective
     call(
         capsys, "render", "heliar-tronnier", "--light", "1,1", "--size", "10x8", "--iris-image", "iris.png",
         "--sensor-distance", "82.5", "-o", "b.exr",
@@ -206,7 +206,7 @@ def test_art_flags_come_after_the_project_s_rules(capsys, projects, folder):
 
 
 def test_a_flag_for_all_that_art_and_lights_can_be(capsys, projects, folder):
-    """A rule, a polygon and the spiral mean what they mean in a project file; rules come before mutes and gains."""
+    """Rule, polygon and spiral have the meaning of a project file; rules come before mutes and gains."""
     (folder / "p.toml").write_text(
         'lens = "heliar-tronnier"\n[[lights]]\nfield_deg = [1, 2]\n'
         'shape = { kind = "polygon", corners_deg = [[-1, 0], [3, 0], [3, 1]] }\n'
@@ -225,13 +225,13 @@ def test_a_flag_for_all_that_art_and_lights_can_be(capsys, projects, folder):
         capsys, "render", "heliar-tronnier", "--light", "1,2", "--mute", "4-1", "--rule", "select = 'all', gain = 2",
         "--size", "8x6", "-o", "a.exr",
     )  # fmt: skip
-    written, told, order = projects
-    assert told == written
+    written, reported, order = projects
+    assert reported == written
     assert [rule.select for rule in order.art.rules] == ["all", "4-1"]
 
 
 def test_a_sun_stays_a_disc_beside_lights_of_a_size(capsys, projects):
-    """As the help's own example has it."""
+    """As in the example of the help."""
     words = ["render", "heliar-tronnier", "--light", "sun@10,5", "--light", "-12,2", "--size", "8x6", "-o", "a.exr"]
     call(capsys, *words, "--light-size", "3x2")
     call(capsys, *words, "--light-diameter", "1", "--light-diameter", "2")
@@ -273,7 +273,7 @@ def test_what_stops_a_render_is_one_sentence_and_leaves_nothing(capsys, monkeypa
     def stop(*args, **kwargs):
         raise error
 
-    for place in ("flarewright.render.render.render", "flarewright.io.exr.write_exr"):
+    for place in ("flarewright.render.render.render", "flarewright.io.images.exr.write_exr"):
         with monkeypatch.context() as patch:
             if place.endswith("write_exr"):
                 patch.setattr("flarewright.render.render.render", lambda p, **_: FakeRendering(p, ()))
@@ -296,20 +296,28 @@ def test_what_stops_a_render_is_one_sentence_and_leaves_nothing(capsys, monkeypa
         ("measure compress run", True),
         ("measure replay model.json --constellation 3 -o a.exr", False),
         ("predict heliar-tronnier -o page.html", True),
-        ("predict heliar-tronnier -o page.html --glare", False),
+        ("predict heliar-tronnier -o page.html --glare", True),
         ("predict heliar-tronnier --cache=kept.npz --glare", True),
-        ("predict heliar-tronnier", False),
         ("render heliar-tronnier --light 1,1 -o a.exr", False),
     ],
 )
-def test_ctrl_c_tells_of_commands_that_go_on(capsys, monkeypatch, words, goes_on):
+def test_ctrl_c_reports_commands_that_resume(capsys, monkeypatch, words, goes_on):
     def stopped(**_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("flarewright.cli.app.app", stopped)
     assert run(words.split()) == 130
-    more = ", and the same command goes on where it was" if goes_on else ""
+    more = ", and the same command resumes" if goes_on else ""
     assert capsys.readouterr().err == f"flarewright: interrupted; nothing was left half-written{more}\n"
+
+
+def test_ctrl_c_reports_the_flag_that_a_command_lacked_to_resume(capsys, monkeypatch):
+    def stopped(**_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("flarewright.cli.app.app", stopped)
+    assert run(["predict", "heliar-tronnier"]) == 130
+    assert capsys.readouterr().err.endswith("; with --output or --cache the same command would resume\n")
 
 
 def test_a_real_draft_render(capsys, folder):
@@ -348,7 +356,7 @@ def test_ghosts_json_is_the_promised_contract(capsys, folder):
     assert all(row["first_reflection"] > row["second_reflection"] for row in data["ghosts"])
     same_side = call_json(capsys, *stopped, "--paths", "same-side")
     assert len(same_side["ghosts"]) == 13
-    # a lens is wide open when no f-number is given
+    # a lens is wide open without an f-number
     (folder / "singlet.toml").write_text(SINGLET)
     wide_open = call_json(capsys, "ghosts", "singlet.toml", "--light", "10,0")
     assert wide_open["f_number"] == 5.0
@@ -357,7 +365,7 @@ def test_ghosts_json_is_the_promised_contract(capsys, folder):
 
 
 def test_ghosts_of_a_near_light(capsys):
-    """Far away it is distant; near, the front takes in the solid angle that it covers."""
+    """Far away it is distant; near, the front covers its solid angle."""
     arguments = ("ghosts", "heliar-tronnier", "--light", "4,3", "--fstop", "8")
     distant, far, near = (call_json(capsys, *arguments, "--distance", distance) for distance in ("inf", "1e9", "300"))
     for table in (distant, far, near):
@@ -377,13 +385,13 @@ def test_ghosts_of_a_near_light(capsys):
     assert near["direct"]["centroid_mm"] == pytest.approx(rendered["direct_position_mm"], abs=0.02)
 
 
-def test_ghosts_tells_the_veiling_glare(capsys, monkeypatch):
-    from flarewright.optics import dust
-    from flarewright.render import glare
+def test_ghosts_prints_the_veiling_glare(capsys, monkeypatch):
+    from flarewright.optics.scattering import dust
+    from flarewright.render.scattering import veiling_glare
 
-    # what is told is tested, not its accuracy (`tests/render/test_glare.py`): few angles, and few sizes of dust
-    monkeypatch.setattr(glare, "WITHIN", 2)
-    monkeypatch.setattr(glare, "OUTSIDE", 4)
+    # tests the printed output, not its accuracy (test_veiling_glare): few angles, few dust sizes
+    monkeypatch.setattr(veiling_glare, "INNER_NODES", 2)
+    monkeypatch.setattr(veiling_glare, "OUTER_NODES", 4)
     monkeypatch.setattr(dust, "SIZES", 12)
     monkeypatch.setattr(dust, "PER_ANGLE", 1)
     monkeypatch.setattr(dust, "_mie_spread", cache(dust._mie_spread.__wrapped__))
@@ -414,7 +422,7 @@ def test_ghosts_table_has_no_negative_zero(capsys):
 
 def test_lenses_lists_all_that_ship(capsys):
     listed = call_json(capsys, "lenses")["lenses"]
-    assert [row["name"] for row in listed] == list(shipped())
+    assert [row["name"] for row in listed] == list(library_names())
     by_name = {row["name"]: row for row in listed}
     assert by_name["heliar-tronnier"]["surfaces"] == 8
     assert by_name["heliar-tronnier"]["efl_mm"] == pytest.approx(HELIAR_EFL, abs=1e-5)
@@ -461,10 +469,10 @@ def test_lens_show_draws(capsys, folder, more):
 
 
 def test_every_shipped_lens_can_be_drawn(capsys):
-    from flarewright.render.cross_section import cross_section
-    from flarewright.render.prepare import first_order
+    from flarewright.render.plots.cross_section import cross_section
+    from flarewright.render.scene.resolve import first_order
 
-    for name in shipped():
+    for name in library_names():
         lens = fw.load_lens(name)
         svg = cross_section(lens, first_order(lens)).svg
         ET.fromstring(svg)
@@ -472,7 +480,7 @@ def test_every_shipped_lens_can_be_drawn(capsys):
         assert "nan," not in svg
 
 
-def test_a_light_too_steep_to_draw_is_told(capsys, folder):
+def test_a_light_too_steep_to_draw_is_reported(capsys, folder):
     light = ("lens", "show", "fisheye-nikkor-10.5", "--plot", "a.svg", "--light")
     said = call(capsys, *light, "0,88")
     assert "flarewright: a light at 88 degrees is too steep to draw and taken at 85\n" in said.err
@@ -480,7 +488,7 @@ def test_a_light_too_steep_to_draw_is_told(capsys, folder):
     assert "too steep" not in call(capsys, *light, "0,85").err
 
 
-def test_lens_check_tells_and_converts(capsys, folder):
+def test_lens_check_reports_and_converts(capsys, folder):
     said = call(capsys, "lens", "check", "heliar-tronnier")
     assert said.out.startswith("heliar-tronnier: usable, Heliar-Tronnier")
     assert "  - row 3: glass 'BAF9' is not in the catalogue" in said.out
@@ -513,14 +521,14 @@ def test_coating_list_states_what_the_coatings_do(capsys):
     assert "modern-broadband" in call(capsys, "coating", "list").out
 
 
-def test_coating_plot_tells_and_draws(capsys, folder):
+def test_coating_plot_prints_and_draws(capsys, folder):
     data = call_json(capsys, "coating", "plot", "quarter-wave:550", "--glass", "1.52")
     at = data["wavelengths_nm"].index(550.0)
     assert data["angles"][0]["reflectance"][at] == pytest.approx(((1.52 - 1.38**2) / (1.52 + 1.38**2)) ** 2, rel=1e-9)
     assert [row["angle_deg"] for row in data["angles"]] == [0, 15, 30, 45, 60]
     assert data["films"] == [{"index": 1.38, "thickness_nm": pytest.approx(550 / 4 / 1.38)}]
     assert "SCHOTT N-SF6" in call(capsys, "coating", "plot", "modern-broadband", "--glass", "n sf6").out
-    # an ideal film reaches zero, which a logarithmic axis cannot hold
+    # an ideal film reaches zero, which a logarithmic axis cannot show
     for name, coating in (("a.svg", "quarter-wave:550:ideal"), ("b.svg", "none"), ("a.png", "early-multicoat")):
         assert call(capsys, "coating", "plot", coating, "-o", name).out == ""
     for name, curves in (("a.svg", 5), ("b.svg", 5)):
@@ -560,12 +568,12 @@ def test_project_init_teaches_and_is_usable(capsys, folder):
 # the program itself
 
 
-def test_flags_without_effect_are_told(capsys):
+def test_flags_without_effect_are_reported(capsys):
     words = ["render", "heliar-tronnier", "--light", "8,5", "--size", "32x18", "--quality", "draft", "-o", "a.exr"]
     words += ["--wavelengths", "1", "--no-starburst"]
     err = call(capsys, *words, "--orders", "4", "--brightest", "3").err
-    assert "draft quality draws ghosts of two reflections alone: --orders 4 is for final quality" in err
-    assert "--brightest counts layers of single ghosts, and there are none: add --layers ghosts" in err
+    assert "draft quality draws ghosts of two reflections only: --orders 4 is for final quality" in err
+    assert "--brightest has no effect without layers of single ghosts: add --layers ghosts" in err
 
 
 def test_help_keeps_its_square_brackets(capsys):
@@ -614,8 +622,8 @@ def test_public_names_are_there_in_any_order():
         "import flarewright as fw\n"
         "lens = fw.load_lens('heliar-tronnier')\n"
         "assert callable(fw.render) and callable(fw.ghosts)\n"
-        "import flarewright.render.display as display\n"
-        "assert fw.render.display is display and callable(fw.render)\n"
+        "import flarewright.render.image.display as display\n"
+        "assert fw.render.image.display is display and callable(fw.render)\n"
         "assert abs(fw.paraxial(lens).efl - 99.2358) < 1e-3\n"
         "assert issubclass(fw.ProjectError, fw.FlarewrightError)\n"
         "assert set(fw.__all__) <= set(dir(fw)) and all(hasattr(fw, name) for name in fw.__all__)\n"
@@ -641,9 +649,11 @@ def test_a_reader_that_goes_away_causes_no_complaint():
 
 
 def test_the_command_leaves_no_threads_to_the_library_of_matrices():
-    """They would spin beside ours; what a person has set stays. Known before NumPy is loaded, or it has no effect."""
+    """They would spin beside our threads; a user's setting is kept. It must be set before NumPy is loaded."""
     code = "import os, sys, flarewright.cli as _; print(os.environ['OPENBLAS_NUM_THREADS'], 'numpy' in sys.modules)"
     for own, wanted in (({}, "1 False"), ({"OPENBLAS_NUM_THREADS": "3"}, "3 False")):
         environment = {key: value for key, value in os.environ.items() if key != "OPENBLAS_NUM_THREADS"} | own
-        told = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-        assert told.stdout.strip() == wanted
+        reported = subprocess.run(
+            [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+        )
+        assert reported.stdout.strip() == wanted

@@ -1,13 +1,20 @@
-"""The design commands: lenses that render, searches that go on, mistakes told in a sentence."""
+"""The design commands: lenses that render, searches that resume, errors in one sentence."""
 
 import json
+import signal
+import threading
 from pathlib import Path
 
 import pytest
 
 from flarewright.cli.app import run
-from flarewright.io.lens_file import read_lens
-from flarewright.io.project_file import project_text, read_project
+from flarewright.cli.common import checkpoints, end_as_interrupted, stop_on_interrupt
+from flarewright.design.results import report
+from flarewright.design.solvers import pool_search
+from flarewright.design.thesis import benchmark as thesis
+from flarewright.errors import OutputError
+from flarewright.io.lens.toml_lens import read_lens
+from flarewright.io.project.project_file import project_text, read_project
 from flarewright.model import Lens
 
 PROJECT = """
@@ -19,7 +26,7 @@ field_deg = [7, 3]
 size_px = [120, 80]
 [design]
 brightness = "stop"
-[[design.wishes]]
+[[design.ghost_targets]]
 ghost = "4-1"
 height = 1.001
 """
@@ -34,37 +41,37 @@ def folder(tmp_path, monkeypatch):
 
 def test_solve_writes_lenses_that_render_and_resume_goes_on(folder, capsys):
     assert run(["design", "solve", "shot.toml", "-o", "found", "--searches", "300", "--lenses", "2", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["lenses"]
-    assert told["searches"] >= 300
-    assert {"place_error_mm", "radius_error_mm"} <= set(told["lenses"][0]["ghosts"][0])
-    for lens in told["lenses"]:
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["lenses"]
+    assert reported["searches"] >= 300
+    assert {"place_error_mm", "radius_error_mm"} <= set(reported["lenses"][0]["ghosts"][0])
+    for lens in reported["lenses"]:
         reading = read_lens(folder / "found" / lens["file"])
         assert isinstance(reading[0], Lens)
         assert (folder / "found" / lens["file"]).with_suffix(".png").stat().st_size > 500
     report = (folder / "found" / "report.html").read_text()
     assert "<script" not in report
     assert "http" not in report
-    assert report.count("data:image/png;base64,") >= 3 * len(told["lenses"])
+    assert report.count("data:image/png;base64,") >= 3 * len(reported["lenses"])
     assert run(["render", "found/lens-1.toml", "--light", "7,3", "--quality", "draft", "--size", "64x36",
                 "--no-png", "-o", "a.exr"]) == 0  # fmt: skip
     capsys.readouterr()
     assert run(["design", "resume", "found", "--searches", "400", "--lenses", "1", "--json"]) == 0
     again = json.loads(capsys.readouterr().out)
-    assert again["searches"] > told["searches"]
-    assert again["lenses"][0]["cost"] <= told["lenses"][0]["cost"] * (1 + 1e-9)
+    assert again["searches"] > reported["searches"]
+    assert again["lenses"][0]["cost"] <= reported["lenses"][0]["cost"] * (1 + 1e-9)
 
 
 def test_a_design_survives_being_written():
     given = read_project("shot.toml")
     text = project_text(given)
-    assert "[[design.wishes]]" in text
+    assert "[[design.ghost_targets]]" in text
     Path("again.toml").write_text(text)
     assert read_project("again.toml").design == given.design
 
 
-def test_benchmark_tells_what_the_issue_asks_for(folder, capsys):
-    assert run(["design", "benchmark", "heliar", "--cpu-time", "0.2", "--picture", "a.png", "--json"]) == 0
+def test_benchmark_prints_the_requested_measures(folder, capsys):
+    assert run(["design", "benchmark", "heliar", "--cpu-time", "0.1", "--picture", "a.png", "--json"]) == 0
     (one,) = json.loads(capsys.readouterr().out)["runs"]
     assert {"seed", "seconds", "fitness_algorithm1", "fitness", "psnr_db", "ssim", "psnr_black_db", "psnr_gain_db",
             "recovered"} <= set(one)  # fmt: skip
@@ -76,20 +83,44 @@ def test_benchmark_tells_what_the_issue_asks_for(folder, capsys):
     assert "25.89 dB" in capsys.readouterr().out
 
 
+def test_a_killed_benchmark_resumes_after_its_finished_runs(folder, monkeypatch, capsys):
+    words = ["design", "benchmark", "heliar", "--cpu-time", "0.02", "--seeds", "2", "--report", "a.html", "--json"]
+    done = []
+    one = thesis.run_trial
+
+    def noted(*arguments, seed, **options):
+        if len(done) == 1:
+            done.append("killed")
+            raise Killed
+        done.append(seed)
+        return one(*arguments, seed=seed, **options)
+
+    monkeypatch.setattr(thesis, "run_trial", noted)
+    with pytest.raises(Killed):
+        run(words)
+    capsys.readouterr()
+    assert run(words) == 0
+    reported = capsys.readouterr()
+    assert "a.partial.json: resuming after 1 run of" in reported.err
+    assert [each["seed"] for each in json.loads(reported.out)["runs"]] == [0, 1]
+    assert done == [0, "killed", 1]
+    assert not (folder / "a.partial.json").exists()
+
+
 def test_identify_finds_the_rank_that_trials_found(capsys):
     words = ["design", "identify", "heliar-tronnier", "--light", "5.45,5.45", "--fstop", "16"]
     assert run([*words, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["rank"], told["unknowns"]) == (17, 23)
-    assert len(told["remedies"]) == 6
-    assert told["rank_with_brightness"] == 23
+    reported = json.loads(capsys.readouterr().out)
+    assert (reported["rank"], reported["unknowns"]) == (17, 23)
+    assert len(reported["remedies"]) == 6
+    assert reported["rank_with_brightness"] == 23
     assert run([*words, "--brightness", "--stop-known", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["rank"], told["unknowns"], told["free"]) == (22, 22, [])
+    reported = json.loads(capsys.readouterr().out)
+    assert (reported["rank"], reported["unknowns"], reported["free"]) == (22, 22, [])
     assert run(words) == 0
     said = capsys.readouterr().out
     assert "fix 17 of 23" in said
-    assert "how bright the ghosts are (bare glass): 23 of 23" in said
+    assert "the brightness of ghosts (bare glass): 23 of 23" in said
 
 
 def test_scratch_and_colors_write_lenses(folder, capsys):
@@ -100,13 +131,13 @@ def test_scratch_and_colors_write_lenses(folder, capsys):
     words = ["design", "colors", "red.toml", "-o", "red-lens.toml", "--starts", "2", "--map", "4-1", "--curves", "3"]
     assert run([*words, "--json"]) == 0
     out, said = capsys.readouterr()
-    told = json.loads(out)
+    reported = json.loads(out)
     # row 5 is the stop, rows 1 and 7 are cemented
-    assert set(told["rows"]) == {str(k) for k in range(9)} - {"1", "5", "7"}
-    assert "rows left bare, for no film can be put between cemented glasses: 1, 7" in said
-    assert len(told["ghosts"]) == 13
+    assert set(reported["rows"]) == {str(k) for k in range(9)} - {"1", "5", "7"}
+    assert "rows left bare, as cemented surfaces take no film: 1, 7" in said
+    assert len(reported["ghosts"]) == 13
     lens = read_lens(folder / "red-lens.toml")[0]
-    assert lens.rows[0].coating.center_wavelength_nm == told["rows"]["0"]["center_wavelength_nm"]
+    assert lens.rows[0].coating.center_wavelength_nm == reported["rows"]["0"]["center_wavelength_nm"]
     assert (folder / "red-lens.4-1.png").stat().st_size > 1000
     assert (folder / "red-lens.row-3.png").stat().st_size > 1000
     assert run([*words[:-4], "--films", "3", "--json"]) == 0
@@ -118,23 +149,23 @@ def test_scratch_and_colors_write_lenses(folder, capsys):
     assert "Algorithm 2" in capsys.readouterr().out
 
 
-def test_a_limit_no_lens_keeps_is_told_and_the_nearest_are_written(folder, capsys):
+def test_an_unreachable_limit_is_reported_and_the_nearest_are_written(folder, capsys):
     head = 'lens = "triplet-pestrecov"\nf_number = 8\n[[lights]]\nfield_deg = [7, 3]\n'
     (folder / "short.toml").write_text(head + '[design.bounds]\nlength = 3.0\nhard = ["length", "edges"]\n')
     assert run(["design", "solve", "short.toml", "-o", "short", "--searches", "100", "--lenses", "1", "--json"]) == 0
     out, err = capsys.readouterr()
-    told = json.loads(out)
-    assert told["verdict"] == "impossible"
+    reported = json.loads(out)
+    assert reported["verdict"] == "impossible"
     assert "hard limit length" in err
-    assert told["lenses"][0]["breaks"]["length"] > 0.01
-    assert told["lenses"][0]["ghosts"]
+    assert reported["lenses"][0]["breaks"]["length"] > 0.01
+    assert reported["lenses"][0]["ghosts"]
     page = (folder / "short" / "report.html").read_text()
     assert "it breaks length" in page
     assert read_lens(folder / "short" / "lens-1.toml")[0].rows
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "reported"),
     [
         (["solve", "no.toml", "-o", "x"], "does not exist"),
         (["solve", "shot.toml"], "missing option '-o'"),
@@ -153,7 +184,7 @@ def test_a_limit_no_lens_keeps_is_told_and_the_nearest_are_written(folder, capsy
         (["scratch", "-o", "x"], "--random N"),
         (["scratch", "-o", "x", "--random", "3", "--ghost", "1,1"], "--random N"),
         (["scratch", "-o", "x", "--ghost", "1"], "not two numbers"),
-        (["scratch", "-o", "x", "--ghost", "1,0"], "a radius is not 0"),
+        (["scratch", "-o", "x", "--ghost", "1,0"], "a radius of 0"),
         (["scratch", "-o", "x", "--random", "3", "--stop-diameter", "-1"], "no diameter"),
         (["scratch", "-o", "x", "--random", "20", "--surfaces", "4"], "surfaces ="),
         (["colors", "shot.toml", "-o", "x.exr"], "must be named"),
@@ -178,10 +209,10 @@ def test_a_limit_no_lens_keeps_is_told_and_the_nearest_are_written(folder, capsy
         (["identify", "heliar-tronnier", "--light", "5,5", "--fstop", "1"], "faster than"),
     ],
 )
-def test_a_mistake_is_one_sentence(words, told, folder, capsys):
+def test_an_error_is_one_sentence(words, reported, folder, capsys):
     head = 'lens = "heliar-tronnier"\n[[lights]]\nfield_deg = [7, 3]\n'
     (folder / "axis.toml").write_text(head.replace("7, 3", "0, 0"))
-    (folder / "wish.toml").write_text(head + "[[design.wishes]]\nradius_mm = 1.0\n")
+    (folder / "wish.toml").write_text(head + "[[design.ghost_targets]]\nradius_mm = 1.0\n")
     (folder / "bounds.toml").write_text(head + "[design.bounds]\nn_d = [1.9, 1.6]\n")
     (folder / "hard.toml").write_text(head + '[design.bounds]\nhard = ["length"]\n')
     (folder / "glass.toml").write_text(head + '[design]\nglasses = ["N-BK77"]\n')
@@ -189,7 +220,128 @@ def test_a_mistake_is_one_sentence(words, told, folder, capsys):
     before = sorted(path.name for path in folder.iterdir())
     assert run(["design", *words]) == 2
     error = capsys.readouterr().err
-    assert told in error
+    assert reported in error
     assert error.startswith("flarewright: error: ")
     assert "Traceback" not in error
     assert sorted(path.name for path in folder.iterdir()) == before
+
+
+class Killed(BaseException):
+    """Ends a command as a kill does: no code of the program handles it."""
+
+
+@pytest.fixture
+def rounds(monkeypatch):
+    """Return a list of callables: the n-th one is called after the n-th round of a search."""
+    planned = []
+    whole = pool_search._without_stale_runs
+
+    def after_round(state, problem):
+        ended = whole(state, problem)
+        if planned:
+            planned.pop(0)()
+        return ended
+
+    monkeypatch.setattr(pool_search, "_without_stale_runs", after_round)
+    return planned
+
+
+def made(folder):
+    """Return the bytes of the lenses in a folder, and its search without the time that it took."""
+    lenses = {path.name: path.read_bytes() for path in folder.glob("lens-*")}
+    return lenses, json.loads((folder / "search.json").read_text()) | {"seconds": 0, "digest": ""}
+
+
+SEARCH = ["--searches", "600", "--lenses", "1", "--time", "600"]
+
+
+@pytest.fixture
+def plain(monkeypatch):
+    """Write no pictures and no page: they follow from the lenses, and take most of the time."""
+    for name, value in (("_draft", None), ("target_pictures", [None]), ("found_pictures", [None]), ("png_bytes", b"")):
+        monkeypatch.setattr(report, name, lambda *_, value=value: value)
+    monkeypatch.setattr(report, "html_page", lambda *_, **__: "")
+
+
+def nothing():
+    """Let a round pass."""
+
+
+def test_an_ended_and_a_killed_search_resume_to_the_same_lenses(folder, plain, rounds, monkeypatch, capsys):
+    assert run(["design", "solve", "shot.toml", "-o", "whole", *SEARCH]) == 0
+    whole = made(folder / "whole")
+    rounds += [nothing, lambda: signal.raise_signal(signal.SIGTERM)]
+    capsys.readouterr()
+    assert run(["design", "solve", "shot.toml", "-o", "cut", *SEARCH]) == 0
+    assert capsys.readouterr().err.endswith("ended early; to resume: flarewright design resume cut\n")
+    assert made(folder / "cut")[1]["searches"] < whole[1]["searches"]
+    assert run(["design", "resume", "cut", *SEARCH]) == 0
+    assert made(folder / "cut") == whole
+
+    monkeypatch.setattr("flarewright.cli.common.CHECKPOINT_S", 0.001)
+    stored = threading.Event()
+    write = report.write_state
+
+    def noted(*arguments):
+        write(*arguments)
+        stored.set()
+
+    def kill():
+        raise Killed
+
+    monkeypatch.setattr(report, "write_state", noted)
+    rounds += [nothing, lambda: stored.wait(60.0), nothing, kill]
+    with pytest.raises(Killed):
+        run(["design", "solve", "shot.toml", "-o", "killed", *SEARCH])
+    assert not list((folder / "killed").glob("lens-*"))
+    assert run(["design", "resume", "killed", *SEARCH]) == 0
+    assert made(folder / "killed") == whole
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_signals_that_end_a_search(name):
+    kind = getattr(signal, name)
+    before = signal.getsignal(kind)
+    with stop_on_interrupt() as asked:
+        assert not asked()
+        signal.raise_signal(kind)
+        assert asked()
+    assert signal.getsignal(kind) is before
+
+
+def test_signals_that_end_a_command(monkeypatch):
+    kinds = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(one, signal.SIG_DFL) for one in kinds]
+    try:
+        # as under nohup
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+        end_as_interrupted()
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+    finally:
+        for one, handler in zip(kinds, before, strict=True):
+            signal.signal(one, handler)
+
+
+def test_a_checkpoint_that_cannot_be_written_is_reported_once(monkeypatch, capsys):
+    monkeypatch.setattr("flarewright.cli.common.CHECKPOINT_S", 0.0)
+    tries, third = [], threading.Event()
+
+    def full():
+        tries.append(1)
+        if len(tries) == 3:
+            third.set()
+        raise OutputError("cannot write found/search.json: no space left on device")
+
+    with checkpoints(full):
+        assert third.wait(60.0)
+    assert capsys.readouterr().err.count("cannot write found/search.json") == 1
+
+
+def test_a_search_from_scratch_resumes_under_its_name(folder, plain):
+    words = ["--light", "10,5", "--ghost", "4,1.5", "--lenses", "1"]
+    assert run(["design", "scratch", *words, "--searches", "60", "-o", "whole"]) == 0
+    assert run(["design", "scratch", *words, "--searches", "1", "-o", "cut"]) == 0
+    assert run(["design", "resume", "cut", "--searches", "60", "--lenses", "1"]) == 0
+    assert made(folder / "cut") == made(folder / "whole")

@@ -1,4 +1,4 @@
-"""What is told of a file that cannot be used: which file, which key in which line, and where it belongs instead."""
+"""Messages on unusable files: which file, which key in which line, and where the key belongs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from flarewright.cli.app import run
-from flarewright.render.prepare import load_lens
+from flarewright.render.scene.resolve import load_lens
 
 LENS = """schema_version = 1
 name = "Singlet"
@@ -35,7 +35,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def refused(capsys, words: list[str]) -> str:
-    """Run a command that has to refuse, and return its sentence."""
+    """Run a command that must fail, and return its sentence."""
     assert run(words) == 2
     out, err = capsys.readouterr()
     assert "Traceback" not in err
@@ -54,7 +54,7 @@ def refused(capsys, words: list[str]) -> str:
         ("scene", "[site]\nlatitude_deg = 1\nlatitude_deg = 2\n", "latitude_deg twice, in lines 2 and 3: keep one"),
     ],
 )
-def test_a_key_that_stands_twice_is_told_with_both_lines(capsys, folder, command, text, words):
+def test_a_duplicate_key_is_reported_with_both_lines(capsys, folder, command, text, words):
     (folder / "twice.toml").write_text(text)
     assert f"twice.toml says {words}" in refused(capsys, [command, "check", "twice.toml"])
 
@@ -89,9 +89,9 @@ def test_what_a_project_asks_of_its_lens_is_refused_with_its_file(capsys, folder
 
 def test_a_missing_iris_image_is_refused_with_the_lens_file_that_names_it(capsys, folder):
     (folder / "masked.toml").write_text(LENS + '[iris]\nmask = "nowhere.png"\n')
-    told = refused(capsys, ["lens", "check", "masked.toml"])
-    assert "masked.toml: " in told
-    assert "nowhere.png: there is no such iris image" in told
+    reported = refused(capsys, ["lens", "check", "masked.toml"])
+    assert "masked.toml: " in reported
+    assert "nowhere.png: there is no such iris image" in reported
 
 
 KINDS = {
@@ -103,15 +103,15 @@ KINDS = {
 
 @pytest.mark.parametrize("given", KINDS)
 @pytest.mark.parametrize("command", KINDS)
-def test_a_file_of_another_kind_is_told_its_own_command(capsys, folder, command, given):
+def test_a_file_of_another_kind_names_its_command(capsys, folder, command, given):
     (folder / "file.toml").write_text(KINDS[given])
     if given == command:
         run([command, "check", "file.toml"])
         assert "check it with" not in capsys.readouterr().err
         return
-    told = refused(capsys, [command, "check", "file.toml"])
-    assert f"file.toml is a {given} file, not a {command} file: " in told
-    assert f"flarewright {given} check file.toml" in told
+    reported = refused(capsys, [command, "check", "file.toml"])
+    assert f"file.toml is a {given} file, not a {command} file: " in reported
+    assert f"flarewright {given} check file.toml" in reported
 
 
 def test_a_scene_of_one_camera_has_one_camera(capsys, folder):
@@ -122,7 +122,7 @@ def test_a_scene_of_one_camera_has_one_camera(capsys, folder):
     assert capsys.readouterr().out == "scene.toml: usable, 1 camera, 1 light, 1 time\n"
 
 
-def test_a_foreign_lens_file_is_told_its_own_command(capsys, folder):
+def test_a_foreign_lens_file_names_its_command(capsys, folder):
     (folder / "old.lens").write_text("# Tessar\n")
     assert "flarewright lens check old.lens" in refused(capsys, ["project", "check", "old.lens"])
 
@@ -185,7 +185,7 @@ def test_a_flags_rule_is_read_as_strictly(capsys, folder):
 @pytest.mark.parametrize("words", [["project", "check", "loop.toml"], ["lens", "show", "loop.toml"]])
 def test_a_link_that_leads_nowhere_is_called_one(capsys, folder, words):
     (folder / "loop.toml").symlink_to("loop.toml")
-    assert "loop.toml is a link that leads nowhere" in refused(capsys, words)
+    assert "loop.toml is a broken link" in refused(capsys, words)
 
 
 def test_a_rule_that_chooses_nothing_is_refused_by_the_judge_too(capsys, folder):

@@ -1,4 +1,4 @@
-"""`flarewright gallery`, `flarewright looks` and what `flarewright` alone shows."""
+"""`flarewright gallery`, `flarewright looks` and `flarewright` without arguments."""
 
 import json
 
@@ -8,7 +8,7 @@ from PIL import Image
 
 from flarewright.cli import gallery as gallery_module
 from flarewright.cli.app import run
-from flarewright.io.look_file import read_look, shipped_looks
+from flarewright.io.project.look_file import read_look, shipped_looks
 from flarewright.render import gallery as pictures
 from flarewright.render.gallery import cards
 
@@ -17,7 +17,7 @@ KNOWN = cards()
 
 @pytest.fixture
 def two_cards(monkeypatch):
-    """A library of a lens and a look, drawn in no time; returns how often each was drawn."""
+    """Install a library of a fast lens and look; return how often each was drawn."""
     drawn = []
 
     def picture(card, size_px):
@@ -26,11 +26,11 @@ def two_cards(monkeypatch):
 
     monkeypatch.setattr(pictures, "cards", lambda: (KNOWN[0], KNOWN[-1]))
     monkeypatch.setattr(pictures, "card_picture", picture)
-    monkeypatch.setattr("flarewright.render.first_run.compile_for_render", lambda *_: None)
+    monkeypatch.setattr("flarewright.render.warmup.compile_for_render", lambda *_: None)
     return drawn
 
 
-def test_a_gallery_goes_on_where_it_was_and_draws_anew_what_changed(two_cards, tmp_path, capsys):
+def test_a_gallery_resumes_and_redraws_changes(two_cards, tmp_path, capsys):
     folder = tmp_path / "new" / "gallery"
     assert run(["gallery", "-o", str(folder), "--size", "32x18", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
@@ -47,10 +47,20 @@ def test_a_gallery_goes_on_where_it_was_and_draws_anew_what_changed(two_cards, t
     assert two_cards == [KNOWN[0].name, KNOWN[-1].name, KNOWN[0].name]
     assert run(["gallery", "-o", str(folder), "--size", "16x9"]) == 0
     assert len(two_cards) == 5
+    capsys.readouterr()
+    damaged = folder / f"lens-{KNOWN[0].name}.png"
+    for data in (b"", damaged.read_bytes()[:-20]):
+        damaged.write_bytes(data)
+        assert run(["gallery", "-o", str(folder), "--size", "16x9"]) == 0
+        assert f"{damaged} is damaged" in capsys.readouterr().err
+    assert len(two_cards) == 7
+    (folder / "gallery.json").write_text("[")
+    assert run(["gallery", "-o", str(folder), "--size", "16x9"]) == 0
+    assert len(two_cards) == 9
 
 
 def test_words_on_the_page_are_escaped():
-    from flarewright.io.contact_sheet import Figure, sheet_page
+    from flarewright.io.images.contact_sheet import Figure, sheet_page
 
     pixels = np.zeros((2, 2, 3), np.uint8)
     page = sheet_page("<b>", [Figure("A & B", "<i>", "x", 'say "y"', "a.png", pixels)])
@@ -60,7 +70,7 @@ def test_words_on_the_page_are_escaped():
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "reported"),
     [
         (["gallery"], "-o"),
         (["gallery", "-o", "file.txt"], "cannot write into file.txt: it is a file"),
@@ -70,12 +80,12 @@ def test_words_on_the_page_are_escaped():
         (["looks", "save", "bare.toml", "-o", "a.toml"], "there is nothing in it for a look"),
     ],
 )
-def test_what_cannot_be_done_is_told(words, told, tmp_path, monkeypatch, capsys):
+def test_errors_are_reported(words, reported, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file.txt").write_text("")
     (tmp_path / "bare.toml").write_text('lens = "tessar-brendel"\n[[lights]]\nfield_deg = [1, 2]\n')
     assert run(words) == 2
-    assert told in capsys.readouterr().err
+    assert reported in capsys.readouterr().err
 
 
 def test_looks_are_listed_and_saved(tmp_path, monkeypatch, capsys):
@@ -109,14 +119,19 @@ def test_the_terminal_shows_a_look_in_half_blocks():
 
 
 def test_the_program_alone_lays_out_the_pictures_that_ship(tmp_path, monkeypatch, capsys):
+    def start():
+        raise AssertionError("a process was started")
+
     monkeypatch.setenv("FLAREWRIGHT_STATE", str(tmp_path))
+    # it compiles nothing
+    monkeypatch.setattr("flarewright.cli.app.head_start", start)
     assert run([]) == 0
     page = tmp_path / "gallery" / "index.html"
     said = capsys.readouterr()
     assert page.as_uri() in said.err
     assert "Usage" in said.out
     assert page.read_text("utf-8").count("<figure>") == len(KNOWN)
-    # without a place for them the help is enough
+    # if they cannot be written, only the help is printed
     monkeypatch.setattr(gallery_module, "shipped_gallery", _full)
     assert run([]) == 0
     assert "pictures of every" not in capsys.readouterr().err

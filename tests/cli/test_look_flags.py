@@ -1,4 +1,4 @@
-"""What `flarewright render` fills in for a lens of the library when nothing is said, and what `--look` puts on it."""
+"""Photographic defaults of `flarewright render` for library lenses, and `--look`."""
 
 from types import SimpleNamespace
 
@@ -6,13 +6,13 @@ import pytest
 
 from flarewright.cli.app import run
 from flarewright.model import AsLens, Bare, BlackBody, Everywhere, Layer, Preset, QuarterWave, Standard
-from flarewright.render.photographed import LIGHT_DEG, ROUGHNESS_LENGTH_UM, ROUGHNESS_UM, ROUNDING
-from flarewright.render.prepare import load_lens
+from flarewright.render.scene.photographic_defaults import LIGHT_DEG, ROUGHNESS_LENGTH_UM, ROUGHNESS_UM, ROUNDING
+from flarewright.render.scene.resolve import load_lens
 
 
 @pytest.fixture
 def projects(monkeypatch, tmp_path):
-    """Return the projects that commands would render; nothing is."""
+    """Return the projects that commands would render, without rendering."""
     import numpy as np
 
     found = []
@@ -23,7 +23,7 @@ def projects(monkeypatch, tmp_path):
         layer = Layer("beauty", np.zeros((height, width, 3), np.float32), (0, 0, width, height))
         return SimpleNamespace(project=project, layers=(layer,), summary={"f_number": 4.0}, remarks=(), ledger=None)
 
-    monkeypatch.setattr("flarewright.render.first_run.compile_for_render", lambda *_: None)
+    monkeypatch.setattr("flarewright.render.warmup.compile_for_render", lambda *_: None)
     monkeypatch.setattr("flarewright.render.render.render", render)
     monkeypatch.chdir(tmp_path)
     return found
@@ -42,9 +42,9 @@ def test_a_lens_of_the_library_is_as_photographed(projects, capsys):
     assert (project.iris.roughness_um, project.iris.roughness_length_um) == (ROUGHNESS_UM, ROUGHNESS_LENGTH_UM)
     assert project.iris.blades == load_lens("takumar-50-f1.4").iris.blades
     assert project.lights[0].diameter_deg == LIGHT_DEG
-    told = capsys.readouterr().err
-    assert "as photographed: f/4, coating preset:period (chosen, not known)" in told
-    assert "--ideal leaves this out" in told
+    reported = capsys.readouterr().err
+    assert "as photographed: f/4, coating preset:period (chosen, not known)" in reported
+    assert "--ideal omits this" in reported
 
 
 def test_ideal_is_the_lens_as_in_its_file(projects, capsys):
@@ -57,7 +57,7 @@ def test_ideal_is_the_lens_as_in_its_file(projects, capsys):
     assert "as photographed" not in capsys.readouterr().err
 
 
-def test_what_is_said_holds(projects, capsys):
+def test_given_settings_are_kept(projects, capsys):
     call(
         "takumar-50-f1.4", "--light", "-9,5", "--fstop", "1.4", "--coating", "early-multicoat", "--rounding", "0",
         "--light-diameter", "0",
@@ -76,7 +76,7 @@ def test_one_thing_said_leaves_the_others(projects):
     assert project.f_number == 4.0
     assert project.iris.blades == 8
     assert project.iris.rounding == 0.0
-    # a sun has a size of its own, and the others' is not guessed beside it
+    # a sun has its own size, and that of the others is not set beside it
     assert [light.diameter_deg for light in project.lights] == [0.53, 0.0]
 
 
@@ -123,10 +123,10 @@ def test_a_look_by_itself_is_its_own_lens_and_lights(projects, dusk, capsys):
     assert (project.lens, project.f_number, project.dirt.dust_per_mm2) == ("tessar-brendel", 8.0, 3.0)
     assert project.lights[0].field_deg == (-5.0, 2.0)
     assert project.lights[0].spectrum == BlackBody(temperature_k=2500.0)
-    # what it says nothing of is as photographed
+    # settings that it leaves open are as photographed
     assert project.lights[0].diameter_deg == LIGHT_DEG
     assert project.iris == load_lens("tessar-brendel").iris.replace(rounding=0.1)
-    assert "as photographed: lights of 0.25 degrees; --ideal leaves this out" in capsys.readouterr().err
+    assert "as photographed: lights of 0.25 degrees; --ideal omits this" in capsys.readouterr().err
 
 
 def test_a_look_goes_onto_another_lens_and_light_and_flags_win(projects, dusk):
@@ -153,20 +153,23 @@ def test_a_look_goes_onto_a_project(projects, dusk, tmp_path):
     (project,) = projects
     assert (project.lens, project.f_number, project.dirt.dust_per_mm2) == ("takumar-50-f1.4", 8.0, 3.0)
     assert project.coating == Everywhere(coating=QuarterWave(center_wavelength_nm=600.0))
-    # a project is taken as it is: nothing else is filled in
+    # a project is used as it is, without defaults
     assert project.lights[0].diameter_deg == 0.0
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "reported"),
     [
-        (["--look", "warm-vintge"], "'warm-vintge' is neither a look that ships nor a file: did you mean warm-vintage"),
+        (
+            ["--look", "warm-vintge"],
+            "'warm-vintge' is neither a look of the library nor a file: did you mean warm-vintage",
+        ),
         (["--look", "none.toml"], "the look none.toml does not exist"),
-        (["model.json", "--look", "dusk.toml"], "model.json is a measured flare and has the look of its own lens"),
+        (["model.json", "--look", "dusk.toml"], "model.json is a measured flare and has the look of its lens"),
     ],
 )
-def test_what_is_no_look_is_told(words, told, dusk, tmp_path, monkeypatch, capsys):
+def test_an_unknown_look_is_reported(words, reported, dusk, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "model.json").write_text("{}")
     assert run(["render", *words, "-o", "a.exr"]) == 2
-    assert told in capsys.readouterr().err
+    assert reported in capsys.readouterr().err

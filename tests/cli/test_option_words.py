@@ -1,4 +1,4 @@
-"""Help names what an option takes in words, never by a type of Python."""
+"""Help names option values by words, never by Python types."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flarewright.cli.app import app, run
 
 
 def options(command: Any, name: str = "flarewright") -> dict[str, Any]:
-    """Return every option below a command by its full name, but for the one of help itself."""
+    """Return every option below a command by its full name, except --help."""
     found = {f"{name} {one.opts[0]}": one for one in command.params if one.param_type_name == "option"}
     for below in getattr(command, "commands", {}).values():
         found |= options(below, f"{name} {below.name}")
@@ -27,7 +27,7 @@ def test_every_option_says_what_it_takes():
     assert found["flarewright render --blades"].metavar == "N"
     assert found["flarewright render --iris-image"].metavar == "FILE"
     assert found["flarewright render --light"].metavar == "X,Y"
-    # a switch takes nothing
+    # a switch takes no value
     assert {found[f"flarewright {name}"].metavar for name in ("render --half", "ghosts --json", "--version")} == {""}
 
 
@@ -41,7 +41,7 @@ def test_every_option_says_what_it_takes():
         ("ghosts heliar-tronnier --light 1,1 --wavelength-nm red", "number"),
     ],
 )
-def test_a_value_of_another_kind_is_told_in_words(capsys, words, said):
+def test_a_value_of_another_kind_is_reported_in_words(capsys, words, said):
     assert run(words.split()) == 2
     err = capsys.readouterr().err
     assert f"invalid value for '{words.split()[-2]}': " in err

@@ -7,9 +7,9 @@ import OpenEXR
 import pytest
 
 from flarewright.cli.app import run
-from flarewright.io.exr import read_exr
-from flarewright.io.reference_state import read_state
-from flarewright.render import ledger, reference
+from flarewright.io.images.exr import read_exr
+from flarewright.io.render_state.reference_state import read_state
+from flarewright.render.reference import energy_ledger, estimator
 
 SMALL = ["render", "triplet-pestrecov", "--light", "8,4", "--size", "24x16", "--no-starburst", "--no-png", "--ledger"]
 REFERENCE = [*SMALL, "--quality", "reference"]
@@ -18,8 +18,8 @@ REFERENCE = [*SMALL, "--quality", "reference"]
 @pytest.fixture(autouse=True)
 def _folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(reference, "SIDE", 16)
-    monkeypatch.setattr(ledger, "SIDE", 16)
+    monkeypatch.setattr(estimator, "SIDE", 16)
+    monkeypatch.setattr(energy_ledger, "SIDE", 16)
 
 
 def test_render_and_go_on(capsys, tmp_path):
@@ -29,7 +29,7 @@ def test_render_and_go_on(capsys, tmp_path):
     assert summary["quality"] == "reference"
     assert summary["reference"]["points"] == 2048
     assert summary["layers"][-1] == "ghosts.order4+.variance"
-    assert "What became of the light" in err
+    assert "Where the light went" in err
     assert "six or more, beside it" in err
     assert summary["ledger"]["sum"] == pytest.approx(1.0, abs=1e-3)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.exr", "a.state.npz"]
@@ -50,7 +50,7 @@ def test_render_and_go_on(capsys, tmp_path):
 
 
 def test_interrupted_says_how_to_go_on(capsys, monkeypatch):
-    add, calls = reference.Sums.add, []
+    add, calls = estimator.Sums.add, []
 
     def interrupt(sums, result):
         add(sums, result)
@@ -58,9 +58,9 @@ def test_interrupted_says_how_to_go_on(capsys, monkeypatch):
         if len(calls) == 3:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(reference.Sums, "add", interrupt)
+    monkeypatch.setattr(estimator.Sums, "add", interrupt)
     assert run([*REFERENCE, "-o", "a.exr"]) == 130
-    assert "to go on: flarewright render --resume a.state.npz -o a.exr" in capsys.readouterr().err
+    assert "to resume: flarewright render --resume a.state.npz -o a.exr" in capsys.readouterr().err
     assert read_state("a.state.npz").batches == 3
 
 

@@ -1,15 +1,15 @@
-"""Compiling ahead of the first render."""
+"""Compilation before the first render."""
 
 from flarewright.cli.app import run
-from flarewright.kernels import first_run
+from flarewright.kernels.jit import warmup
 
 
-def test_what_is_missing_is_compiled_and_told(monkeypatch, capsys):
-    """In this process too: where no helper may start, on one core, it is all there is."""
-    missing, compiled = ["row sums", "pixels"], []
-    monkeypatch.setattr(first_run, "absent", lambda _: [name for name in missing if name not in compiled])
-    monkeypatch.setattr(first_run, "compile_together", lambda names, *_: compiled.append(names[0]))
-    monkeypatch.setattr(first_run, "compile_roots", compiled.extend)
+def test_missing_kernels_are_compiled_and_reported(monkeypatch, capsys):
+    """Also in this process: on one core, where no helper may start, it is the only way."""
+    missing, compiled = ["sum_rows", "collect"], []
+    monkeypatch.setattr(warmup, "absent", lambda _: [name for name in missing if name not in compiled])
+    monkeypatch.setattr(warmup, "compile_together", lambda names, *_: compiled.append(names[0]))
+    monkeypatch.setattr(warmup, "compile_roots", compiled.extend)
     assert run(["warm-up"]) == 0
     assert compiled == missing
     said = capsys.readouterr()

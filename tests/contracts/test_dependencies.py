@@ -1,4 +1,4 @@
-"""The package imports what `pip install .` and its extras bring, and nothing that only developers have."""
+"""The package imports only what `pip install .` and its extras install, and nothing that only developers have."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-# names of distributions that are imported by another name
+# distributions whose import name differs
 MODULES = {"pillow": "PIL"}
-# what comes with one of ours and is used beside it
+# modules that a dependency brings and the package imports directly
 COMPANIONS = {"numba": {"llvmlite"}, "typer": {"click"}}
 FOR_DEVELOPERS = {"dev", "oracle", "bake", "e2e"}
-# a line, or a statement behind another one, that begins as an import does
+# the start of an import statement, at the start of a line or behind another statement
 IMPORTS = re.compile(r"(?m)(?:^|[;:])[ \t]*(import|from)[ \t]+([^;#\n]*)")
-# what a person may have installed by other means; asked for politely (`render.display`)
+# optional modules that the user may have installed separately; the import may fail (`render.image.display`)
 OPTIONAL = {"PyOpenColorIO"}
 
 
@@ -27,7 +27,7 @@ def modules(requirements: list[str]) -> set[str]:
 
 
 def perhaps_imported(text: str) -> list[str]:
-    """Return the names of modules that a source imports; words of its texts may be among them."""
+    """Return the names of modules that a source imports; words of its string literals may be among them."""
     found = []
     for word, names in IMPORTS.findall(text.replace("\\\n", " ")):
         listed = names.split(",") if word == "import" else [names]
@@ -35,7 +35,7 @@ def perhaps_imported(text: str) -> list[str]:
     return found
 
 
-def test_nothing_is_imported_that_a_user_has_not():
+def test_every_import_is_an_installed_dependency():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     allowed = modules(project["dependencies"]) | OPTIONAL | set(sys.stdlib_module_names) | {"flarewright"}
     for extra, requirements in project["optional-dependencies"].items():
@@ -44,7 +44,7 @@ def test_nothing_is_imported_that_a_user_has_not():
     strange = []
     for file in sorted((ROOT / "src").rglob("*.py")):
         text = file.read_text(encoding="utf-8")
-        # to parse every file takes seconds: those whose lines hold no other module's name need it not
+        # parsing every file takes seconds: skip files in which the regular expression finds only allowed modules
         if all(name.split(".")[0] in allowed for name in perhaps_imported(text)):
             continue
         for node in ast.walk(ast.parse(text)):
@@ -57,7 +57,7 @@ def test_nothing_is_imported_that_a_user_has_not():
     assert strange == []
 
 
-def test_every_way_to_import_is_seen():
+def test_every_form_of_import_is_found():
     text = """import one, two.part as other,three
     from four.part import thing
 try: import five
@@ -73,5 +73,5 @@ from \\
 """
     found = {name.split(".")[0] for name in perhaps_imported(text)}
     assert found == {"one", "two", "three", "four", "five", "six", "seven", "eight"}
-    # a line of a text looks like it, and is parsed
+    # a line of prose that looks like an import gives a name; such files are parsed
     assert perhaps_imported("from here on there is nothing") == ["here"]

@@ -1,16 +1,16 @@
-"""A small lens whose ghosts tests look for."""
+"""A small lens whose ghosts are the targets of several tests."""
 
 import numpy as np
 
-from flarewright.design.objective import own_objective
-from flarewright.design.prescription import structure_of, structures, vector_of
-from flarewright.design.problem import Problem
-from flarewright.model.design import Bounds
-from flarewright.render.prepare import load_lens
+from flarewright.design.problem.objective import own_objective
+from flarewright.design.problem.prescription import structure_of, structures, vector_of
+from flarewright.design.problem.problem import Problem
+from flarewright.model.project.design import Bounds
+from flarewright.render.scene.resolve import load_lens
 
 
 def planted(*, signed=True, extra=500.0, begin=False):
-    """The ghosts of a triplet, looked for among all lenses of six surfaces."""
+    """Return a problem with the ghosts of a triplet as targets, among all lenses of six surfaces."""
     lens = load_lens("triplet-pestrecov")
     structure = structure_of(lens)
     vector = vector_of(lens, 6.0, 42.0)

@@ -1,11 +1,11 @@
-"""The assignment of least cost, against scipy's."""
+"""The assignment of least cost, compared with scipy's."""
 
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
-from flarewright.kernels.design_match import match
+from flarewright.kernels.design.assignment import match
 
 
 @given(st.integers(1, 12), st.integers(0, 6), st.integers(0, 2**32 - 1), st.booleans())

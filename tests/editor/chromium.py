@@ -1,4 +1,4 @@
-"""A real editor and a real browser, for tests and for the pictures of the documentation."""
+"""A real editor process and a real browser, for tests and for the pictures of the documentation."""
 
 import os
 import re
@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -16,34 +17,37 @@ SRC = Path(__file__).parents[2] / "src"
 
 
 def chromium():
-    """Return Debian's browser, or whatever is called alike; None where there is none."""
+    """Return the path of Chromium, or of a compatible browser; None if there is none."""
     return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
 class Editor:
-    """`flarewright edit` as a process of its own."""
+    """`flarewright edit` as a separate process, with a sample that renders fast, or that of a user."""
 
-    def __init__(self, state, *words, port=0):
-        self.state, self.words, self.port = state, words, port
+    def __init__(self, state, *words, port=0, own_sample=False):
+        self.state, self.words, self.port, self.own_sample = state, words, port, own_sample
         self.start()
 
     def start(self):
-        # the tests' own kernels: they are compiled already
+        # use the tests' kernel cache, which is compiled already
         environment = {**os.environ, "FLAREWRIGHT_STATE": str(self.state), "PYTHONUNBUFFERED": "1"}
-        # the editor compiles with helpers, as a user's does (tests/conftest.py has none)
+        # let the editor compile with helper processes, as for a user (tests/conftest.py disables them)
         environment.pop("FLAREWRIGHT_HELPER", None)
         if "site-packages" not in str(__import__("flarewright").__file__):
             environment["PYTHONPATH"] = os.pathsep.join([str(SRC), environment.get("PYTHONPATH", "")]).rstrip(
                 os.pathsep
             )
-        # a sample that is drawn in no time
-        code = (
-            "from flarewright.editor import session; from flarewright.model import Project; "
-            f"session.sample_project = lambda: Project.model_validate_json({few_ghosts().model_dump_json()!r}); "
-            "from flarewright.cli.app import main; main()"
-        )
+        code = "from flarewright.cli.app import main; main()"
+        if not self.own_sample:
+            code = (
+                "from flarewright.editor.session import session; from flarewright.model import Project; "
+                f"session.sample_project = lambda: Project.model_validate_json({few_ghosts().model_dump_json()!r}); "
+            ) + code
         self.process = subprocess.Popen(
-            [sys.executable, "-c", code, "edit", "--no-browser", "--port", str(self.port), *self.words],
+            [
+                sys.executable, "-c", code, "edit", "--no-browser", "--port", str(self.port),
+                "--root", str(Path(self.state).parent), *self.words,
+            ],
             stderr=subprocess.PIPE, text=True, env=environment,
         )  # fmt: skip
         line = self.process.stderr.readline()
@@ -53,7 +57,7 @@ class Editor:
         self.port = int(re.search(r":(\d+)/", self.address)[1])
 
     def kill(self):
-        """As a power cut would."""
+        """Kill the process, as a power cut would."""
         self.process.send_signal(signal.SIGKILL)
         self.process.wait()
         self.process.stderr.close()
@@ -70,7 +74,7 @@ class Editor:
             self.process.stderr.close()
 
 
-# a hang is not a slow machine: the first page waits for kernels to be compiled
+# a hang is not a slow computer: the first page waits for kernels to be compiled
 PATIENCE_MS = 180_000
 
 
@@ -85,7 +89,7 @@ def browser():
 
 
 class Tab:
-    """A page with the editor, and the few things that a person does there again and again."""
+    """A page with the editor, and frequent user actions."""
 
     def __init__(self, page, editor):
         self.page, self.editor = page, editor
@@ -104,12 +108,16 @@ class Tab:
         return self.page.evaluate(expression)
 
     def until(self, expression, timeout_s=PATIENCE_MS / 1000.0):
-        self.page.wait_for_function(expression, timeout=1000.0 * timeout_s)
+        # the page's Content-Security-Policy forbids scripts from text, so the browser cannot wait for one by itself
+        end = time.monotonic() + timeout_s
+        while not self.js(f"Promise.resolve({expression}).then(Boolean)"):
+            assert time.monotonic() < end, expression
+            self.page.wait_for_timeout(15)
 
     def rest(self):
         """Wait until the final picture is shown and the ghosts are measured."""
         self.until("window.flarewright?.state && window.flarewright.view.image")
-        # what was just asked for has reached the page
+        # pending requests have reached the page
         self.page.wait_for_timeout(60)
         self.until(
             "(() => { const a = flarewright, p = a.state.picture; return !a.under.way && (p.problem || (p.current &&"
@@ -122,8 +130,16 @@ class Tab:
     def tab(self, name):
         self.page.click(f"[data-tab={name}]")
 
+    def save_as(self, path, keys="Control+s"):
+        """Save the project in a new file, by the dialog that `keys` open."""
+        self.page.keyboard.press(keys)
+        self.page.fill("dialog input[name=path]", str(path))
+        self.page.keyboard.press("Enter")
+        # the state arrives before the dialog closes, and an open dialog takes all keys
+        self.until("flarewright.state.clean && !document.querySelector('dialog')")
+
     def light(self):
-        """Return where the light's handle is on the page."""
+        """Return the place of the light's handle on the page."""
         x, y = self.js("flarewright.view.lightPage(0)")
         box = self.page.locator("#view").bounding_box()
         return box["x"] + x, box["y"] + y
@@ -146,7 +162,7 @@ class Tab:
         mouse.up()
 
     def shown(self, image="flarewright.view.image"):
-        """Return the pixels that the page shows, or of another of its pictures: shape (H, W, 3)."""
+        """Return the pixels on the page, or of another of its pictures: shape (H, W, 3)."""
         import base64
         import io
 
@@ -163,7 +179,7 @@ class Tab:
 
 
 def download(tab, entry, path):
-    """Export as a person would."""
+    """Export a file through the menu."""
     tab.page.click("#export")
     with tab.page.expect_download(timeout=PATIENCE_MS) as waiting:
         tab.page.click(f"[role=menuitem]:has-text('{entry}')")
@@ -172,7 +188,7 @@ def download(tab, entry, path):
 
 
 def drop(tab, name, data):
-    """Drop a file on the page, as the system's file manager does."""
+    """Drop a file on the page, as a file manager does."""
     tab.page.evaluate(
         "([name, bytes]) => { const box = new DataTransfer();"
         "box.items.add(new File([new Uint8Array(bytes)], name));"

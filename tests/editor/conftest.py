@@ -1,13 +1,13 @@
-"""The editor's tests keep their state to themselves, and say why they skip where the extra is absent."""
+"""Fixtures of the editor's tests: isolated state, small pictures, and skips where the extra is not installed."""
 
 from importlib.util import find_spec
 
 import pytest
 from sample import few_ghosts
 
-from flarewright.editor import ladder, studio
-from flarewright.editor.jobs import Lane
-from flarewright.editor.seen import see
+from flarewright.editor.common.latest_job import Lane
+from flarewright.editor.preview import draft_calibration, render_picture
+from flarewright.editor.preview.ghost_picking import see
 from flarewright.model import Camera, Iris, Light, Output, Preset, Project, Quality
 
 collect_ignore = [] if find_spec("starlette") else ["test_editor_server.py"]
@@ -16,7 +16,7 @@ collect_ignore = [] if find_spec("starlette") else ["test_editor_server.py"]
 @pytest.fixture(autouse=True)
 def _own_state(tmp_path, monkeypatch):
     monkeypatch.setenv("FLAREWRIGHT_STATE", str(tmp_path / "state"))
-    monkeypatch.setattr("flarewright.editor.session.sample_project", few_ghosts)
+    monkeypatch.setattr("flarewright.editor.session.session.sample_project", few_ghosts)
 
 
 @pytest.fixture
@@ -28,22 +28,29 @@ def project():
 
 
 def plainly(project):
-    """Return a project without a starburst or rings, at few wavelengths: what makes a picture slow."""
+    """Return a project without starburst and rings, at few wavelengths: these make a picture slow."""
     return project.replace(output=Output(starburst=False), quality=Quality(wavelengths=3, ringing="off"))
 
 
 _drawn = {}
-"""What small screens have drawn in this process: nearly every one begins with the same picture."""
+"""Pictures drawn by small screens in this process, as nearly every test starts with the same picture."""
 
 
 def drawn_once(draw):
-    """Return what draws a project, be it a picture or its ghosts, and draws the same only once."""
+    """Return a cached version of a function that draws a project or its ghosts."""
 
     def known(project, *words, progress=None, **more):
-        # `see` is called with its progress in third place
+        # `see` takes its progress as the third argument
         words, last = (words[:1], words[1:]) if draw.__name__ == "see" else (words, ())
-        told = [each.model_dump_json() if hasattr(each, "model_dump_json") else each for each in words]
-        key = draw.__name__, project.model_dump_json(), *told, *sorted(more.items()), studio.WIDEST, studio.HIGHEST
+        reported = [each.model_dump_json() if hasattr(each, "model_dump_json") else each for each in words]
+        key = (
+            draw.__name__,
+            project.model_dump_json(),
+            *reported,
+            *sorted(more.items()),
+            render_picture.WIDEST,
+            render_picture.HIGHEST,
+        )
         if key not in _drawn:
             _drawn[key] = draw(project, *words, *last, **({} if last else {"progress": progress}), **more)
         return _drawn[key]
@@ -53,9 +60,9 @@ def drawn_once(draw):
 
 @pytest.fixture(params=["small", pytest.param("full", marks=pytest.mark.slow)])
 def screen_size(request, monkeypatch):
-    """The viewport a fifth as wide, plain projects, drafts learned at one angle; at full size among the slow tests.
+    """Make the viewport a fifth as wide, projects plain, and calibrate drafts at one angle; full size in slow tests.
 
-    Returns what makes a project as simple as the size asks for.
+    Return a function that simplifies a project accordingly.
     """
     lanes = []
 
@@ -63,19 +70,19 @@ def screen_size(request, monkeypatch):
         lanes.append(Lane(name))
         return lanes[-1]
 
-    monkeypatch.setattr("flarewright.editor.screen.Lane", lane)
-    monkeypatch.setattr("flarewright.editor.solving.Lane", lane)
+    monkeypatch.setattr("flarewright.editor.preview.viewport.Lane", lane)
+    monkeypatch.setattr("flarewright.editor.design.search_job.Lane", lane)
     small = request.param == "small"
     if small:
-        monkeypatch.setattr(studio, "WIDEST", 192)
-        monkeypatch.setattr(studio, "HIGHEST", 108)
-        monkeypatch.setattr(ladder, "ANGLES_DEG", (20.0,))
-        monkeypatch.setattr("flarewright.editor.session.sample_project", lambda: plainly(few_ghosts()))
-        monkeypatch.setattr(studio, "take", drawn_once(studio.take))
-        for module in ("ladder", "sharpening"):
-            monkeypatch.setattr(f"flarewright.editor.{module}.see", drawn_once(see))
+        monkeypatch.setattr(render_picture, "WIDEST", 192)
+        monkeypatch.setattr(render_picture, "HIGHEST", 108)
+        monkeypatch.setattr(draft_calibration, "ANGLES_DEG", (20.0,))
+        monkeypatch.setattr("flarewright.editor.session.session.sample_project", lambda: plainly(few_ghosts()))
+        monkeypatch.setattr(render_picture, "take", drawn_once(render_picture.take))
+        for module in ("draft_calibration", "progressive_render"):
+            monkeypatch.setattr(f"flarewright.editor.preview.{module}.see", drawn_once(see))
     yield plainly if small else lambda project: project
-    # what a test leaves undrawn takes no time from the next one
+    # pending drawing must not take time from the next test
     for each in lanes:
         each.close()
         assert each.wait(60.0)
@@ -83,13 +90,13 @@ def screen_size(request, monkeypatch):
 
 @pytest.fixture
 def shot(screen_size, project):
-    """The project as simple as the size of the screen asks for."""
+    """Return the project, simplified for the size of the screen."""
     return screen_size(project)
 
 
 @pytest.fixture(scope="module")
 def chrome():
-    # those without the extras skip before they ask for it
+    # tests without the extras skip before they request it
     from chromium import browser
 
     with browser() as found:
@@ -98,7 +105,7 @@ def chrome():
 
 @pytest.fixture
 def tab(chrome, tmp_path):
-    """A page with an editor of its own."""
+    """Return a page with its own editor."""
     from chromium import Editor, Tab
 
     editor = Editor(tmp_path / "state")
@@ -106,12 +113,12 @@ def tab(chrome, tmp_path):
     try:
         yield (opened := Tab(context.new_page(), editor))
     finally:
-        # also where the page did not open: an editor left alone goes on for ever
+        # also if the page did not open: an editor would run forever
         context.close()
         editor.end()
-    # the browser tells of every answer 400 by itself; the page told it in words
+    # the browser logs every answer 400; the page has shown its message
     assert [said for said in opened.said if "400" not in said] == []
-    # no request leaves the machine
+    # no request leaves the computer
     assert {url.split("/")[2] for url in opened.asked if not url.startswith(("blob:", "data:"))} <= {
         editor.address.split("/")[2]
     }

@@ -1,4 +1,4 @@
-"""The editor driven as a person does, in a real browser: `pytest -m browser`."""
+"""The editor in a real browser, driven by mouse and keys: `pytest -m browser`."""
 
 import io
 import json
@@ -7,12 +7,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from flarewright.io.lens_file import read_lens
-from flarewright.io.library import lens_path
-from flarewright.io.project_file import read_project
+from flarewright.io.lens.library import lens_path
+from flarewright.io.lens.toml_lens import read_lens
+from flarewright.io.project.project_file import read_project
 from flarewright.model import Project
 from flarewright.render.analysis import ghosts
-from flarewright.render.display import view
+from flarewright.render.image.display import view
 from flarewright.render.render import render
 
 pytest.importorskip("playwright", reason="the extra e2e is not installed")
@@ -27,12 +27,12 @@ pytestmark = [
 
 
 def project_of(tab, tmp_path) -> Project:
-    """Take the project from the page as a person would: export it, and read the file."""
+    """Export the project from the page, and read the file."""
     return read_project(download(tab, "Project file", tmp_path / "exported.toml"))
 
 
 def judged(tab, project):
-    """Return how far the shown picture is from an ordinary render of a project, in mean codes of 255."""
+    """Return the difference of the shown picture from a plain render of a project, in mean codes of 255."""
     camera = project.camera.replace(size_px=(960, 540), sensor_mm=project.camera.sensor)
     light = render(project.replace(camera=camera)).layers[0].pixels
     wanted = view(light, tab.state()["view"]["stops"]).astype(float)
@@ -46,7 +46,7 @@ def test_drag_the_light_and_see_the_flare_move(tab, tmp_path):
     drawn = tab.js(rays)
     first = tab.light()
     tab.drag(first, (first[0] - 120, first[1] + 60), steps=60, hold_ms=20)
-    # pictures came while the hand moved
+    # pictures arrived during the drag
     assert len(tab.js("flarewright.view.stats.shown")) >= 2
     tab.rest()
     after = tab.shown()
@@ -55,7 +55,7 @@ def test_drag_the_light_and_see_the_flare_move(tab, tmp_path):
     x, y = project.lights[0].field_deg
     assert x < 7.0
     assert y < 4.0
-    # and so do the rays in the cross-section
+    # the rays in the cross-section move too
     tab.until(f"({rays}) !== {json.dumps(drawn)}")
     assert judged(tab, project) < 1.5
     # one drag is one step
@@ -81,7 +81,7 @@ def test_the_light_goes_out_of_the_frame_and_keys_move_it(tab):
 
 def test_drafts_do_not_jump_in_brightness(tab):
     def level(image="flarewright.view.image"):
-        # beside the direct image, which moves
+        # away from the direct image, which moves
         shown = tab.shown(image)
         return shown[:, : shown.shape[1] * 2 // 5].astype(float).mean()
 
@@ -91,29 +91,29 @@ def test_drafts_do_not_jump_in_brightness(tab):
     mouse.down()
     mouse.move(first[0] - 20, first[1] + 10)
     mouse.move(first[0] - 40, first[1] + 20)
-    # kept as it is seen: where a machine is slow, the final one is there before it has been looked at
+    # keep it when it is shown: on a slow computer the final one may follow before the test looks
     tab.until(
         "flarewright.view.shownGrade === 'moving' && !flarewright.view.mover.busy()"
         " && (window.kept = flarewright.view.image)"
     )
     moving = level("window.kept")
-    # a hand that holds still sees what it would when letting go
+    # a paused drag shows the final picture
     tab.until("flarewright.view.shownGrade === 'final'")
     held = level()
-    # a picture of a place that the hand has left comes too late, though nothing is under way any more
+    # a picture of an earlier place of the drag is dropped, even if no request is pending
     tab.js(
         "flarewright.view.shownGrade = '', flarewright.state.picture.lights[0][0] += 1e-4, flarewright.view.refresh()"
     )
     assert tab.js("flarewright.view.shownGrade") == ""
     tab.js("flarewright.state.picture.lights[0][0] = flarewright.view.mover.lights[0][0], flarewright.view.refresh()")
     assert tab.js("flarewright.view.shownGrade") == "final"
-    # what is said of the light is the hand's, not the project's
+    # the panel shows the light of the drag, not of the project
     numbers = tab.js("flarewright.view.mover.lights[0]")
     assert numbers != tab.state()["lights"][0]["field_deg"]
-    # also where the panel is drawn anew meanwhile, as when the table of ghosts comes
+    # also when the panel is redrawn meanwhile, as for a new table of ghosts
     tab.js("flarewright.refreshPanel()")
     assert tab.js("document.querySelector('#panel input').value") == f"{numbers[0]:.2f}"
-    # and goes on with drafts
+    # moving on shows drafts again
     mouse.move(first[0] - 60, first[1] + 26)
     tab.until("flarewright.view.shownGrade === 'moving'")
     mouse.move(first[0] - 44, first[1] + 21)
@@ -152,7 +152,7 @@ def test_a_click_chooses_among_all_ghosts_there(tab):
     assert tab.state()["by_hand"] == 1
 
 
-def test_who_scrolls_at_once_walks_the_ghosts(tab):
+def test_scrolling_at_once_steps_through_the_ghosts(tab):
     place = tab.at(0.62, 0.52)
     zoom = tab.js("flarewright.view.zoom")
     tab.page.mouse.click(*place)
@@ -163,7 +163,7 @@ def test_who_scrolls_at_once_walks_the_ghosts(tab):
 
 
 def test_a_drag_goes_on_whatever_is_selected(tab):
-    """A selection would be dragged itself, and what the browser ends is kept."""
+    """No selection is dragged, and a drag ended by the browser is kept."""
     tab.page.evaluate("document.activeElement.blur()")
     tab.page.keyboard.press("Control+a")
     assert "Open" not in tab.js("String(getSelection())")
@@ -196,7 +196,7 @@ def test_the_foot_and_the_hint_say_what_is_shown(tab):
         tab.until("flarewright.view.stack.length > 1 && document.getElementById('hint').textContent.includes('scroll')")
 
     click()
-    # the ghosts are no longer under that place when the picture is zoomed, or the light moved
+    # after zooming or moving the light, the ghosts are no longer under that place
     tab.page.mouse.move(*tab.at(0.3, 0.3))
     tab.page.mouse.wheel(0, -100)
     tab.until("flarewright.view.zoom !== 1 && !flarewright.view.stack.length")
@@ -204,7 +204,7 @@ def test_the_foot_and_the_hint_say_what_is_shown(tab):
     tab.page.keyboard.press("f")
     click()
     first = tab.light()
-    # a busy machine may show it for a moment only
+    # a busy computer may show it for a moment only
     tab.js("{ window.read = []; const grade = document.getElementById('grade');"
            "new MutationObserver(() => read.push(grade.textContent)).observe(grade, {childList: true}); }")  # fmt: skip
     tab.page.mouse.move(*first)
@@ -217,12 +217,13 @@ def test_the_foot_and_the_hint_say_what_is_shown(tab):
     assert tab.js("flarewright.view.stack.length") == 0
     click()
     tab.tab("target")
-    tab.page.click("#wish-add")
-    tab.until("flarewright.wish === 0")
+    tab.page.click("#ghost-target-add")
+    tab.until("flarewright.ghostTarget === 0")
     assert hint() == ""
     tab.until("!document.querySelector('#section .head').textContent.includes('ghost')")
     click()
-    said, shown = tab.js("flarewright.deed('choose_lens', {lens: 'tessar-brendel'}).then(() => {const a = flarewright;"
+    said, shown = tab.js("flarewright.command('choose_lens', {lens: 'tessar-brendel'}).then(() => {"
+                         "const a = flarewright;"
                          "return [document.getElementById('grade').textContent, a.state.picture.current"
                          "&& a.view.shownNumber === a.state.picture.number]; })")  # fmt: skip
     assert shown or not said.startswith("final")
@@ -261,7 +262,7 @@ def test_edit_cells_undo_five_redo_five(tab, tmp_path):
         tab.page.keyboard.press("Control+Shift+z")
     tab.until("!flarewright.state.redo")
     assert tab.state()["lens"]["rows"] == done
-    # what cannot be read is refused beside the cell, and nothing is lost
+    # unreadable text is rejected beside the cell, and the previous value is kept
     box = tab.page.locator("input[data-row='1'][data-column='glass']")
     box.fill("N-NOTHING")
     box.press("Enter")
@@ -273,13 +274,13 @@ def test_a_refused_number_does_not_stay(tab):
     stops = tab.js("document.querySelector('input[name=exposure]').value")
     tab.page.fill("input[name=exposure]", "1000")
     tab.page.press("input[name=exposure]", "Enter")
-    tab.until(told("Exposure must be at most 60"))
+    tab.until(reported("Exposure must be at most 60"))
     tab.until(f"document.querySelector('input[name=exposure]').value === '{stops}'")
     tab.tab("ghosts")
     tab.page.click("[data-ghost] >> nth=0")
     tab.page.fill("input[name=ghost_gain]", "-3")
     tab.page.press("input[name=ghost_gain]", "Enter")
-    tab.until(told("Gain must be at least 0"))
+    tab.until(reported("Gain must be at least 0"))
     tab.until("document.querySelector('input[name=ghost_gain]').value === '1'")
     assert "×" not in tab.page.locator("tr.chosen").inner_text()
 
@@ -294,7 +295,7 @@ def test_a_cell_of_another_lens_is_not_written(tab):
            " values: { lens: 'tessar-brendel' } }) })")  # fmt: skip
     tab.until("flarewright.state.lens.shipped === 'tessar-brendel'")
     box.press("Enter")
-    tab.until("document.querySelector('.wrong').textContent.includes('another one')")
+    tab.until("document.querySelector('.wrong').textContent.includes('has changed since')")
     tab.rest()
     radius = tab.state()["lens"]["rows"][0]["radius"]
     assert tab.state()["lens"]["shipped"] == "tessar-brendel"
@@ -304,12 +305,12 @@ def test_a_cell_of_another_lens_is_not_written(tab):
     tab.until("flarewright.state.lens.rows[0].radius === '30'")
 
 
-def test_what_is_told_of_a_written_cell_stays_in_sight(tab):
+def test_remarks_on_an_edited_cell_stay_visible(tab):
     tab.tab("lens")
     box = tab.page.locator("input[data-row='0'][data-column='semi_diameter']")
     box.fill("500")
     box.press("Enter")
-    # the hand is in the next row by now
+    # the focus is in the next row by now
     note = tab.page.get_by_text("row 0, Semi: The rim lies beyond the sphere's equator")
     note.wait_for()
     assert tab.js("document.activeElement.dataset.row") == "1"
@@ -325,7 +326,7 @@ def test_a_broken_lens_keeps_the_last_good_picture(tab):
         box.fill("flat")
         box.press("Tab")
         tab.until(f"flarewright.state.lens.rows[{row}].radius === 'flat'")
-    # on the way there it may have been a lens for a moment
+    # an intermediate state may have been a valid lens
     tab.until("flarewright.state.lens.problem.includes('afocal')")
     tab.page.wait_for_timeout(500)
     tab.until("document.getElementById('problem').textContent.includes('last good picture')")
@@ -351,19 +352,19 @@ def test_import_export_and_a_wrong_file(tab, tmp_path):
     assert len(table.splitlines()) == 1 + len(tab.js("flarewright.ghosts.ghosts"))
     before = tab.state()["lens"]
     drop(tab, "holiday.pdf", b"%PDF-1.4 nothing of use")
-    tab.until(told("holiday.pdf cannot be opened here"))
+    tab.until(reported("holiday.pdf cannot be opened here"))
     drop(tab, "broken.toml", b"schema_version = 1\nname = 'x'\n")
-    tab.until(told("broken.toml"))
+    tab.until(reported("broken.toml"))
     assert tab.state()["lens"] == before
 
 
-def told(words):
+def reported(words):
     return f"[...document.querySelectorAll('.toast')].some(t => t.textContent.includes({json.dumps(words)}))"
 
 
 def test_the_exported_exr_is_a_render_of_the_project(tab, tmp_path):
-    from flarewright.io.exr import read_exr
-    from flarewright.io.half import rounded_to_half
+    from flarewright.io.images.exr import read_exr
+    from flarewright.io.images.half import rounded_to_half
 
     tab.tab("light")
     tab.page.select_option("select[name=size]", "1280x720")
@@ -378,12 +379,10 @@ def test_the_exported_exr_is_a_render_of_the_project(tab, tmp_path):
 
 def test_a_project_is_saved_under_another_name(tab, tmp_path):
     for name, keys in (("one.toml", "Control+s"), ("two.toml", "Control+Shift+s")):
-        tab.page.keyboard.press(keys)
-        tab.page.fill("dialog input[name=path]", str(tmp_path / name))
-        tab.page.keyboard.press("Enter")
-        tab.until(f"flarewright.state.file?.endsWith({json.dumps(name)}) && flarewright.state.clean")
+        tab.save_as(tmp_path / name, keys)
+        assert tab.state()["file"] == str(tmp_path / name)
         assert (tmp_path / name).is_file()
-    # the name so far is the one that is changed
+    # the dialog starts with the present name
     tab.page.click("#export")
     tab.page.click("[role=menuitem]:has-text('Save as')")
     assert tab.page.locator("dialog input[name=path]").input_value() == str(tmp_path / "two.toml")
@@ -402,8 +401,8 @@ def test_nothing_is_lost_when_the_server_is_killed(tab):
     tab.until("document.querySelector('.toast.error')")
     tab.editor.start()
     tab.said.clear()
-    # the page finds its way back by itself
-    tab.until(told("is back"))
+    # the page reconnects by itself
+    tab.until(reported("is back"))
     tab.rest()
     after = tab.state()
     for key in ("lights", "iris", "lens", "steps", "undo"):
@@ -441,15 +440,15 @@ def test_annotate_solve_accept(tab, tmp_path):
     place = next(p for p in tab.js("flarewright.view.places") if p["name"] == "8-6")
     tab.js("flarewright.choose('8-6')")
     tab.rest()
-    # pull it by its middle, along the line
+    # drag its middle along the line
     x, y = tab.js(f"(v => v.toPage(...v.line(v.placeOf({json.dumps(place)}))))(flarewright.view)")
     box = tab.page.locator("#view").bounding_box()
     start = (box["x"] + x, box["y"] + y)
     tab.drag(start, (start[0] + 30, start[1] - 16))
-    tab.until("flarewright.state.design?.wishes.length === 1")
-    wish = tab.state()["design"]["wishes"][0]
-    assert wish["ghost"] == "8-6"
-    assert wish["move_mm"] > 0.5
+    tab.until("flarewright.state.design?.ghost_targets.length === 1")
+    ghost_target = tab.state()["design"]["ghost_targets"][0]
+    assert ghost_target["ghost"] == "8-6"
+    assert ghost_target["move_mm"] > 0.5
     tab.page.click("[data-compare=wipe]")
     tab.until("flarewright.view.target")
     tab.page.fill("input[name=seconds]", "4")
@@ -461,31 +460,31 @@ def test_annotate_solve_accept(tab, tmp_path):
     assert 1 <= count <= 5
     assert tab.page.locator(".candidates img").count() == count
     tab.until("[...document.querySelectorAll('.candidates img')].every(i => i.naturalWidth > 0)")
-    # they stand below what was asked for, and come into sight
+    # they are below the settings, and the page scrolls to them
     frame, shown = (tab.page.locator(each).bounding_box() for each in ("#page", ".candidates figure >> nth=0"))
     assert shown["y"] + shown["height"] <= frame["y"] + frame["height"] + 1
     assert tab.page.locator("#stop").bounding_box()["y"] >= frame["y"] - 1
     before, lens = tab.state()["lens"]["facts"]["f_number"], tab.state()["solve"]["found"][0]
     tab.page.click("[data-accept='0']")
     tab.until("flarewright.state.lens.name.startsWith('After')")
-    # whose f-number is its own, and this is told
+    # its f-number changed, which the message reports
     after = tab.state()["lens"]["facts"]["f_number"]
     assert f" mm f/{after:.3g};" in lens
-    told = tab.page.locator(".toast.good", has_text="was accepted").inner_text()
-    assert f"at its own f/{after:.3g}, no longer at f/{before:.3g}" in told
+    reported = tab.page.locator(".toast.good", has_text="was accepted").inner_text()
+    assert f"its f-number is f/{after:.3g} instead of f/{before:.3g}" in reported
     tab.rest()
     project = project_of(tab, tmp_path)
     assert project.lens.name == f"After {name} 1"
-    # the ghost is where it was wanted, as far as the solver says it met the wish
+    # the ghost is at its target, within the error that the solver reported
     tab.page.locator("#view").focus()
     tab.page.keyboard.press("Control+z")
     tab.until(f"flarewright.state.lens.name === {json.dumps(name)}")
-    assert tab.state()["design"]["wishes"][0]["ghost"] == "8-6"
+    assert tab.state()["design"]["ghost_targets"][0]["ghost"] == "8-6"
 
 
 def test_a_ghost_beside_the_light_can_be_pulled_too(tab):
-    """Whichever is nearer is taken: the light's handle lay over the ghosts around it."""
-    tab.js("flarewright.deed('move_light', {light: 0, x: 0.5, y: 0.25})")
+    """The nearer one of ghost and light handle is dragged; the handle used to cover the ghosts around it."""
+    tab.js("flarewright.command('move_light', {light: 0, x: 0.5, y: 0.25})")
     tab.rest()
     tab.tab("target")
     tab.until("flarewright.view.places.length > 0")
@@ -500,10 +499,10 @@ def test_a_ghost_beside_the_light_can_be_pulled_too(tab):
     one, start = next((one, (x, y)) for one, (x, y) in places if 7.0 < np.hypot(x - lx, y - ly) < 15.0)
     tab.js(f"flarewright.choose({json.dumps(one['name'])})")
     tab.drag(start, (start[0] + 30, start[1] - 15))
-    tab.until("flarewright.state.design?.wishes.length === 1")
-    assert tab.state()["design"]["wishes"][0]["ghost"] == one["name"]
+    tab.until("flarewright.state.design?.ghost_targets.length === 1")
+    assert tab.state()["design"]["ghost_targets"][0]["ghost"] == one["name"]
     assert tab.state()["lights"][0]["field_deg"] == [0.5, 0.25]
-    # and the light itself is taken where it is
+    # the light itself can be dragged at its place
     tab.drag((lx, ly), (lx - 40, ly + 10))
     tab.rest()
     assert tab.state()["lights"][0]["field_deg"][0] < 0.0
@@ -518,14 +517,14 @@ def test_looks_are_put_on_by_a_click_and_saved_and_dropped(tab, tmp_path):
     tab.until("document.querySelector('#looks img').naturalWidth > 0")
     before = tab.state()
     tab.page.click("#looks button")
-    tab.until("flarewright.state.undo === 'Put on a look'")
+    tab.until("flarewright.state.undo === 'Apply a look'")
     worn = tab.state()
     assert worn["lights"][0]["field_deg"] == before["lights"][0]["field_deg"]
     assert worn["lights"][0]["spectrum"] != before["lights"][0]["spectrum"]
     text = download(tab, "Look", tmp_path / "again.look.toml").read_bytes()
     assert b"cleanliness_level = 450.0" in text
     tab.page.click("#undo")
-    tab.until("flarewright.state.redo === 'Put on a look'")
+    tab.until("flarewright.state.redo === 'Apply a look'")
     drop(tab, "again.look.toml", text)
     tab.until("flarewright.state.undo?.startsWith('Look ')")
     assert tab.state()["lights"][0]["spectrum"] == worn["lights"][0]["spectrum"]
@@ -552,7 +551,7 @@ def test_the_library_and_the_keys(tab):
     tab.page.keyboard.press("?")
     assert "move the light" in tab.page.locator("dialog").inner_text()
     tab.page.keyboard.press("Escape")
-    # every control can be reached without a mouse and has a name
+    # every control is reachable without a mouse and has a name
     tab.page.keyboard.press("1")
     names = tab.js(
         "[...document.querySelectorAll('button, select, input:not([hidden])')].filter(e => e.offsetParent).map(e =>"
@@ -618,7 +617,7 @@ def test_the_colour_map_is_in_sight_and_marks_what_the_mirrors_wear(tab):
     tab.until("flarewright.state.coating !== 'per-row'")
     assert worn() == before
     assert marked() == pytest.approx(before, abs=3.0)
-    # by keys: along the map, as far as it goes
+    # by keys: along the map, up to its end
     tab.page.focus(".map img")
     for key in ("ArrowUp", "ArrowUp", "Shift+ArrowLeft"):
         tab.page.keyboard.press(key)
@@ -626,8 +625,8 @@ def test_the_colour_map_is_in_sight_and_marks_what_the_mirrors_wear(tab):
     tab.until(f"document.querySelector('.map + div').textContent.includes('row 6: {wanted[0]:g} nm')")
     assert worn() == wanted
     assert marked() == pytest.approx(wanted, abs=3.0)
-    # what no place of the map stands for is marked nowhere
-    tab.js("flarewright.deed('set_coating', {text: 'none'})")
+    # coatings outside the map have no mark
+    tab.js("flarewright.command('set_coating', {text: 'none'})")
     tab.until("document.querySelector('.map i').hidden")
 
 
@@ -638,23 +637,23 @@ def test_what_cannot_be_solved_for_yet_says_why(tab):
     assert tab.page.locator("#solve").is_disabled()
     assert scratch.is_disabled()
     assert "add a ghost first" in tab.page.locator(".row:has(input[name=scratch])").inner_text()
-    tab.page.click("#wish-add")
-    tab.until("flarewright.state.design?.wishes.length === 1 && flarewright.wish === 0")
+    tab.page.click("#ghost-target-add")
+    tab.until("flarewright.state.design?.ghost_targets.length === 1 && flarewright.ghostTarget === 0")
     assert tab.page.locator("button:has-text('added ghost 1')").count() == 1
     assert tab.page.locator("#solve").is_enabled()
     scratch.check()
     tab.until("flarewright.state.design.own_ghosts === false")
-    # with the last ghost that was added goes what was said of it
+    # removing the last added ghost removes its design settings
     for _ in range(2):
         tab.page.click("#undo")
     tab.until("flarewright.state.design === null")
-    assert tab.js("flarewright.wish") is None
-    assert tab.page.locator("input[name=wish_move]").is_hidden()
+    assert tab.js("flarewright.ghost_target") is None
+    assert tab.page.locator("input[name=target_move]").is_hidden()
     assert scratch.is_disabled()
 
 
 def test_words_of_the_page_leave_room_for_each_other(tab):
-    """Toasts, row numbers, a ghost's sentence, a light's angles and the note below the table, at 1280 by 720."""
+    """Toasts, row numbers, a ghost's remark, a light's angles and the notes below the table, at 1280 by 720."""
     tab.js("fetch('/api/open', {method: 'POST', body: JSON.stringify({text: 'canon-28-80'})})")
     tab.until("flarewright.state.lens.rows.length > 25")
     tab.until("document.querySelectorAll('#section text').length > 25")
@@ -666,13 +665,13 @@ def test_words_of_the_page_leave_room_for_each_other(tab):
     left, _, right, _ = box_of(tab, "#section")
     assert left < numbers[0][0]
     assert numbers[-1][1] < right
-    # a ghost without rays there says so in full
-    tab.page.route("**/api/section?ghost=*", lambda route: route.fulfill(json={"svg": "", "told": NO_RAYS}))
+    # a ghost without rays there has its full remark
+    tab.page.route("**/api/section?ghost=*", lambda route: route.fulfill(json={"svg": "", "reported": NO_RAYS}))
     tab.js("flarewright.choose('25-6')")
     tab.until(f"document.querySelector('#section .head').textContent.includes({json.dumps(NO_RAYS)})")
     assert box_of(tab, "#section .head > span > span:last-child")[2] < box_of(tab, "#section .head button")[0]
-    # the name of the ghost and the angles of a light that is held in the corner
-    tab.js("flarewright.deed('move_light', {light: 0, x: -60, y: -45})")
+    # the name of the ghost and the angles of a light kept in the corner
+    tab.js("flarewright.command('move_light', {light: 0, x: -60, y: -45})")
     tab.until("flarewright.state.lights[0].field_deg[0] === -60")
     tab.js(
         "(() => { const kind = CanvasRenderingContext2D.prototype, plain = kind.fillText; window.written = [];"
@@ -683,14 +682,14 @@ def test_words_of_the_page_leave_room_for_each_other(tab):
     _, _, low = next(each for each in tab.js("written") if each[0].startswith("-60"))
     hint, stage = box_of(tab, "#hint"), box_of(tab, "#stage")
     assert stage[1] + low < hint[1]
-    # what is said three times stands there once, and over the picture
+    # a repeated message is shown once, over the picture
     for _ in range(3):
-        tab.js("flarewright.deed('set_cell', {row: 0, column: 'radius', text: 'x'}).catch(() => {})")
+        tab.js("flarewright.command('set_cell', {row: 0, column: 'radius', text: 'x'}).catch(() => {})")
     tab.until("document.querySelector('.toast')")
     tab.page.wait_for_timeout(300)
     assert tab.page.locator(".toast").count() == 1
     assert box_of(tab, "#toasts")[3] <= box_of(tab, "#section")[1]
-    # no row of the table shows below the note
+    # no row of the table shows below the notes
     tab.tab("lens")
     assert box_of(tab, ".notes")[3] == pytest.approx(box_of(tab, "#page")[3], abs=0.5)
 
@@ -711,8 +710,10 @@ def test_nothing_of_one_half_shows_in_the_other(tab):
         )
 
     before = right_half()
-    tab.js("flarewright.deed('add_ghost', {place_mm: 15, radius_mm: 14}).then(() => flarewright.chooseWish(0))")
-    tab.until("flarewright.wish === 0")
+    tab.js(
+        "flarewright.command('add_ghost', {place_mm: 15, radius_mm: 14}).then(() => flarewright.chooseGhostTarget(0))"
+    )
+    tab.until("flarewright.ghostTarget === 0")
     tab.page.wait_for_timeout(500)
     assert right_half() == before
 
@@ -746,7 +747,7 @@ def test_a_path_is_keyed_played_and_undone(tab, tmp_path):
     tab.until("flarewright.state.lights[0].keys.length === 2")
     last = tab.state()["lights"][0]["field_deg"]
     steps = tab.state()["steps"]["at"]
-    # it loops, and nothing is changed until it stops
+    # it loops, and the project changes only when it stops
     shown = tab.js("flarewright.view.stats.shown.length")
     tab.page.keyboard.press("t")
     tab.until("flarewright.view.shownGrade === 'moving'")
@@ -761,11 +762,11 @@ def test_a_path_is_keyed_played_and_undone(tab, tmp_path):
     assert tab.state()["lights"][0]["field_deg"] == pytest.approx(wanted, abs=0.02)
     assert tab.state()["steps"]["at"] == steps + 1
     assert judged(tab, project_of(tab, tmp_path)) < 1.5
-    # along the path by hand: one step more of the same kind
+    # scrubbing the path: one more step of the same kind
     bar = tab.page.locator("input[name=path_at]")
     bar.focus()
     bar.press("Home")
-    # the page asks for it when it comes to it, on a busy machine later
+    # the page requests it when idle, on a busy computer later
     tab.until(f"flarewright.state.lights[0].field_deg[0] === {first[0]}")
     tab.rest()
     assert tab.state()["lights"][0]["field_deg"] == first
@@ -783,7 +784,7 @@ def test_a_path_is_keyed_played_and_undone(tab, tmp_path):
     assert tab.page.locator("#path-play").is_disabled()
 
 
-def test_a_zmx_file_is_dropped_and_its_repairs_are_told(tab):
+def test_a_zmx_file_is_dropped_and_its_repairs_are_listed(tab):
     head = ["MODE SEQ", "NAME Dropped doublet", "UNIT MM", "ENPD 20", "SURF 0", "  DISZ INFINITY"]
     rows = [("0.01627", "6", "N-BK7"), ("-0.0224", "2.5", "SF5"), ("-0.0077", "90", "")]
     lines = list(head)
@@ -793,12 +794,12 @@ def test_a_zmx_file_is_dropped_and_its_repairs_are_told(tab):
     lines += ["SURF 4", "  DISZ 0"]
     drop(tab, "doublet.zmx", "\r\n".join(lines).encode("utf-16"))
     tab.until("flarewright.state.lens.name === 'Dropped doublet'")
-    tab.until(told("the stop stands in front of it"))
+    tab.until(reported("the stop is placed in front of it"))
     tab.rest()
     assert tab.state()["picture"]["problem"] == ""
     before = tab.state()["lens"]
     drop(tab, "mirror.zmx", "\n".join(lines).replace("GLAS SF5", "GLAS MIRROR").encode())
-    tab.until(told("surface 2 is a mirror"))
+    tab.until(reported("surface 2 is a mirror"))
     assert tab.state()["lens"] == before
 
 
@@ -812,7 +813,7 @@ def test_an_iris_is_drawn_and_a_matte_hides_the_light(tab, tmp_path):
     tab.page.set_input_files("input[name=holdout_image]", str(tmp_path / "matte.png"))
     tab.until("flarewright.state.holdout")
     tab.rest()
-    # the light stands up right, behind the black part
+    # the light is up right, behind the black part
     assert tab.shown().max() == 0
     tab.page.click("input[name=holdout_invert]")
     tab.until("flarewright.state.holdout.invert")
@@ -821,7 +822,7 @@ def test_an_iris_is_drawn_and_a_matte_hides_the_light(tab, tmp_path):
     tab.page.click("#holdout-none")
     tab.until("!flarewright.state.holdout")
     tab.page.set_input_files("input[name=holdout_depth]", str(tmp_path / "matte.png"))
-    tab.until(told("matte.png: this cannot be read as a depth plate"))
+    tab.until(reported("matte.png cannot be read as a depth plate"))
     tab.tab("iris")
     tab.page.click("#mask-draw")
     tab.page.click("[data-shape=Slit]")
@@ -830,23 +831,23 @@ def test_an_iris_is_drawn_and_a_matte_hides_the_light(tab, tmp_path):
     mask = np.asarray(Image.open(tab.state()["iris"]["mask"]).convert("L"))
     assert mask.mean() / 255.0 == pytest.approx(0.88 * 0.12, rel=0.02)
     assert tab.page.get_by_text("drawn.png, instead of blades").count() == 1
-    # the sample's blades are turned; what is drawn stands as it was drawn
-    tab.until(told("The blades were turned by 10°; the image stands as it was drawn"))
+    # the sample's blades are rotated, but a drawn image is not
+    tab.until(reported("The blades were rotated by 10°; the image is not rotated"))
     assert tab.state()["iris"]["rotation_deg"] == 0.0
-    # the sheet begins with it, so that it can be gone on with
+    # the mask editor starts with the image, so that it can be edited further
     tab.page.click("#mask-draw")
-    tab.until("document.querySelector('.sheet')?.dataset.begun")
+    tab.until("document.querySelector('.sheet')?.dataset.started")
     tab.page.click("#mask-use")
     tab.page.wait_for_timeout(300)
     again = np.asarray(Image.open(tab.state()["iris"]["mask"]).convert("L")).astype(float)
     assert np.abs(again - mask).max() <= 1.0
-    # it is the same picture, so nothing was done
+    # the same picture again is no change
     assert tab.state()["undo"] == "Change the iris"
-    # one that is turned by hand says so on its sheet, and blades come back as they stood
+    # a rotated mask says so in the mask editor, and blades return with their earlier rotation
     type_into(tab, "rotation", "25")
     tab.until("flarewright.state.iris.rotation_deg === 25")
     tab.page.click("#mask-draw")
-    assert tab.page.locator("#mask-turned").text_content() == "In the lens this sheet is turned by 25° (Rotation)."
+    assert tab.page.locator("#mask-turned").text_content() == "In the lens this mask is rotated by 25° (Rotation)."
     tab.page.keyboard.press("Escape")
     tab.page.click("#mask-none")
     tab.until("flarewright.state.iris.mask === null && flarewright.state.iris.rotation_deg === 10")
@@ -877,13 +878,13 @@ def test_the_stop_moves_and_the_lens_stays_as_sharp(tab, tmp_path):
 
 
 def test_the_lights_handle_stays_on_its_image_where_a_lens_bends_lines(tab):
-    """A fisheye's image of 40 degrees lies far within f tan of them."""
+    """A fisheye images 40 degrees far inside f tan."""
     tab.tab("library")
     tab.until("document.querySelectorAll('.library button').length > 10")
     tab.page.fill("input[name=search]", "fisheye")
     tab.page.click(".library button")
     tab.until("flarewright.state.lens.name.includes('isheye')")
-    tab.js("flarewright.deed('move_light', {light: 0, x: 40, y: 15})")
+    tab.js("flarewright.command('move_light', {light: 0, x: 40, y: 15})")
     tab.rest()
     x, y = tab.light()
     left, top, width, height = tab.frame()
@@ -891,7 +892,7 @@ def test_the_lights_handle_stays_on_its_image_where_a_lens_bends_lines(tab):
     direct = ghosts("fisheye-nikkor-10.5", (40.0, 15.0), f_number=16.0).direct.centroid_mm
     place = (left + width * (0.5 + direct[0] / sensor[0]), top + height * (0.5 - direct[1] / sensor[1]))
     assert np.hypot(place[0] - x, place[1] - y) < 1.0
-    # its rays by f tan would be beside the picture's edge
+    # by f tan it would be beside the picture's edge
     assert place[0] < left + 0.9 * width
 
 
@@ -904,37 +905,37 @@ def value_of(tab, name):
     return tab.page.locator(f"input[name={name}]").input_value()
 
 
-def test_a_number_that_is_not_taken_as_typed_is_told(tab):
+def test_a_number_changed_by_a_command_is_reported(tab):
     type_into(tab, "light_x", "100")
-    tab.until(told("100° right became 80°"))
+    tab.until(reported("100° right became 80°"))
     tab.until("document.querySelector('input[name=light_x]').value === '80'")
     type_into(tab, "f_number", "1")
-    tab.until(told("F/1 became f/3.5"))
+    tab.until(reported("F/1 became f/3.5"))
     tab.until("document.querySelector('input[name=f_number]').value === '3.5'")
     type_into(tab, "intensity", "much")
-    tab.until(told("Intensity: “much” is no number, so it stays 1."))
+    tab.until(reported("Intensity: “much” is no number, so it stays 1."))
     assert value_of(tab, "intensity") == "1"
     type_into(tab, "light_y", "")
-    tab.until(told("Up: needs an angle, so it stays 4.4."))
+    tab.until(reported("Up: needs an angle, so it stays 4.4."))
     assert value_of(tab, "light_y") == "4.4"
     type_into(tab, "path_time", "-2")
-    tab.until(told("-2 s became 0 s"))
+    tab.until(reported("-2 s became 0 s"))
     tab.until("document.querySelector('input[name=path_time]').value === '0.00'")
     tab.tab("iris")
     type_into(tab, "blades", "2")
-    tab.until(told("2 blades became a round opening"))
+    tab.until(reported("2 blades became a round opening"))
     tab.until("document.querySelector('input[name=blades]').value === '0'")
     type_into(tab, "scratch_um", "0")
-    tab.until(told("Scratch width must be more than 0"))
+    tab.until(reported("Scratch width must be more than 0"))
     tab.until("document.querySelector('input[name=scratch_um]').value !== '0'")
     type_into(tab, "dust_um_0", "x")
-    tab.until(told("Dust: “x” is no number"))
+    tab.until(reported("Dust: “x” is no number"))
     assert value_of(tab, "dust_um_0") != "x"
     tab.tab("target")
     type_into(tab, "seconds", "0")
-    tab.until(told("0 s became 1 s"))
+    tab.until(reported("0 s became 1 s"))
     assert value_of(tab, "seconds") == "1"
-    # a slider that passes over numbers says nothing
+    # a slider that skips values shows no message
     tab.tab("iris")
     tab.js("document.getElementById('toasts').replaceChildren()")
     tab.page.focus(".row:has(input[name=blades]) input[type=range]")
@@ -946,7 +947,7 @@ def test_a_number_that_is_not_taken_as_typed_is_told(tab):
 def test_what_never_reached_the_editor_does_not_stay(tab, tmp_path):
     tab.page.wait_for_timeout(300)
     tab.editor.kill()
-    gone = told("does not answer")
+    gone = reported("does not answer")
     tab.until(gone)
     before = {name: value_of(tab, name) for name in ("intensity", "light_x", "exposure", "f_number")}
     for name, value in before.items():
@@ -960,7 +961,7 @@ def test_what_never_reached_the_editor_does_not_stay(tab, tmp_path):
     tab.until(f"document.querySelector(\"input[data-row='0'][data-column='radius']\").value === {json.dumps(radius)}")
     tab.until(gone)
     tab.editor.start()
-    tab.until(told("is back"))
+    tab.until(reported("is back"))
     tab.rest()
     assert tab.state()["steps"]["at"] == 0
     tab.said.clear()
@@ -968,22 +969,19 @@ def test_what_never_reached_the_editor_does_not_stay(tab, tmp_path):
 
 def test_what_was_refused_goes_when_it_is_done(tab, tmp_path):
     path = tmp_path / "shot.toml"
-    tab.page.keyboard.press("Control+s")
-    tab.page.fill("dialog input[name=path]", str(path))
-    tab.page.keyboard.press("Enter")
-    tab.until("flarewright.state.clean")
+    tab.save_as(path)
     path.write_text(path.read_text() + "\n# by somebody else")
     tab.tab("iris")
     type_into(tab, "blades", "99")
-    tab.until(told("Blades must be at most 24"))
+    tab.until(reported("Blades must be at most 24"))
     type_into(tab, "blades", "9")
     tab.until("flarewright.state.iris.blades === 9")
-    tab.until(f"!{told('Blades must be at most 24')}")
+    tab.until(f"!{reported('Blades must be at most 24')}")
     tab.page.keyboard.press("Control+s")
-    tab.until(told("save again to overwrite"))
+    tab.until(reported("save again to overwrite"))
     tab.page.keyboard.press("Control+s")
-    tab.until(told("Saved"))
-    assert tab.js(f"!{told('save again to overwrite')}")
+    tab.until(reported("Saved"))
+    assert tab.js(f"!{reported('save again to overwrite')}")
 
 
 def test_every_cell_of_the_table_shows_its_number(tab):
@@ -1002,10 +1000,10 @@ def test_every_cell_of_the_table_shows_its_number(tab):
     tab.page.wait_for_timeout(200)
     assert tab.js(cut) == []
     for lens in ("canon-28-80", "fisheye-nikkor-10.5"):
-        tab.js(f"flarewright.deed('choose_lens', {{lens: {json.dumps(lens)}}})")
+        tab.js(f"flarewright.command('choose_lens', {{lens: {json.dumps(lens)}}})")
         tab.until(f"flarewright.state.lens.shipped === {json.dumps(lens)}")
-        # stacks are longer than any table; a quarter wave is read as well
-        tab.js("flarewright.deed('set_coating', {text: 'preset:single-coated'})")
+        # stacks are wider than any table; a quarter wave is readable
+        tab.js("flarewright.command('set_coating', {text: 'preset:single-coated'})")
         tab.until("flarewright.state.coating === 'preset:single-coated'")
         tab.page.wait_for_timeout(200)
         assert tab.js(cut.replace(":not([data-column=coating])", "")) == []
@@ -1018,23 +1016,20 @@ def test_a_light_that_is_added_is_chosen(tab):
     names = "[...document.querySelectorAll('.buttons button')].map(e => [e.textContent, e.className])"
     shown = [each for each in tab.js(names) if each[0].startswith("Light")]
     assert shown == [["Light 1", ""], ["Light 2", ""], ["Light 3", "on"]]
-    # and it is this one that is moved
+    # and it is the one that moves
     type_into(tab, "light_x", "2")
     tab.until("flarewright.state.lights[2].field_deg[0] === 2")
 
 
-def test_the_time_of_a_path_begins_anew_with_another_project(tab, tmp_path):
+def test_the_time_of_a_path_is_reset_with_another_project(tab, tmp_path):
     tab.page.click("#path-key")
     tab.until("flarewright.state.lights[0].keys.length === 1")
     type_into(tab, "path_time", "3")
     tab.until("flarewright.player.at === 3")
-    tab.page.keyboard.press("Control+s")
-    tab.page.fill("dialog input[name=path]", str(tmp_path / "one"))
-    tab.page.keyboard.press("Enter")
-    tab.until("flarewright.state.clean")
+    tab.save_as(tmp_path / "one")
     assert value_of(tab, "path_time") == "3.00"
     tab.page.click("#open")
-    tab.page.fill("dialog input[name=path]", "nothing of the kind")
+    tab.page.fill("dialog input[name=path]", str(tmp_path / "nothing of the kind"))
     tab.page.keyboard.press("Enter")
     tab.until("document.querySelector('dialog .wrong').textContent.includes('the panel Library shows every lens')")
     tab.page.fill("dialog input[name=path]", "tessar-brendel")
@@ -1045,16 +1040,16 @@ def test_the_time_of_a_path_begins_anew_with_another_project(tab, tmp_path):
 
 def test_from_scratch_can_be_taken_back(tab):
     tab.tab("target")
-    tab.page.click("#wish-add")
-    tab.until("flarewright.state.design?.wishes.length === 1")
+    tab.page.click("#ghost-target-add")
+    tab.until("flarewright.state.design?.ghost_targets.length === 1")
     tab.page.select_option("select[name=structure]", "lens")
     tab.until("flarewright.state.design.structure === 'lens'")
     scratch, structure = tab.page.locator("input[name=scratch]"), tab.page.locator("select[name=structure]")
     scratch.check()
     tab.until("flarewright.state.design.structure === 'any' && !flarewright.state.design.own_ghosts")
-    # also where the page has been loaded anew meanwhile, and something else was changed
-    type_into(tab, "wish_move", "3")
-    tab.until("flarewright.state.design.wishes[0].place_mm === 3")
+    # also when the page was reloaded meanwhile, and something else was changed
+    type_into(tab, "target_move", "3")
+    tab.until("flarewright.state.design.ghost_targets[0].place_mm === 3")
     tab.page.reload()
     tab.rest()
     tab.tab("target")
@@ -1062,26 +1057,26 @@ def test_from_scratch_can_be_taken_back(tab):
     tab.until("flarewright.state.design.own_ghosts")
     assert tab.state()["design"]["structure"] == "lens"
     assert structure.input_value() == "lens"
-    # so can the ghost, and what it needed goes with it
+    # the ghost can be removed too, with the settings that it needed
     tab.page.select_option("select[name=structure]", "any")
-    tab.page.locator("#page button", has_text="Take all back").click()
+    tab.page.locator("#page button", has_text="Remove all").click()
     tab.until("flarewright.state.design === null")
-    tab.page.click("#wish-add")
+    tab.page.click("#ghost-target-add")
     tab.until("flarewright.state.design?.structure === 'any'")
-    tab.page.click("#wish-back")
-    tab.until("flarewright.state.design.wishes.length === 0")
+    tab.page.click("#ghost-target-back")
+    tab.until("flarewright.state.design.ghost_targets.length === 0")
     assert structure.input_value() == "lens"
     assert tab.said == []
 
 
 def test_the_target_is_shown_as_the_picture_is(tab):
-    """It kept the look, the exposure and the background of the moment in which it was switched on."""
+    """The target uses the present look, exposure and background, not those of the moment when it was switched on."""
     from PIL import Image
 
     tab.tab("target")
     tab.page.click("[data-compare=wipe]")
     tab.until("flarewright.view.target")
-    # without wishes it is the same picture by matrices, so the two are alike in all that they are shown with
+    # without targets it is the same picture by matrices, so the two have equal display settings
     middle = (
         "(() => { const t = flarewright.view.target, c = new OffscreenCanvas(t.width, t.height);"
         "const p = c.getContext('2d'), sum = [0, 0, 0]; p.drawImage(t, 0, 0);"
@@ -1114,7 +1109,7 @@ def test_the_target_is_shown_as_the_picture_is(tab):
 
 
 def test_keys_move_every_slider_by_its_step(tab):
-    """Where a slider's bar is bent, the browser's steps of the bar were less than one of the value and led nowhere."""
+    """With a curved slider, the browser's steps of the bar used to be smaller than a step of the value."""
 
     def keyed(name, *keys):
         tab.page.focus(f".row:has(input[name={name}]) input[type=range]")
@@ -1126,7 +1121,7 @@ def test_keys_move_every_slider_by_its_step(tab):
     assert keyed("intensity", "PageUp", "Shift+ArrowLeft", "ArrowDown") == 1.01
     assert keyed("f_number", "ArrowRight") == 16.1
     assert keyed("f_number", "Home") == 0.7
-    # as far as the lens opens
+    # limited by the lens
     tab.until("document.querySelector('input[name=f_number]').value === '3.5'")
     tab.until("flarewright.state.lights[0].intensity === 1.01 && flarewright.state.lens.f_number === 3.5")
     tab.tab("iris")
@@ -1153,7 +1148,7 @@ def test_false_colours_have_a_legend(tab):
 
 
 def key_two_places(tab):
-    """Key the light where it is, and nine seconds later at another place."""
+    """Set a key at the light's place, and another one nine seconds later at another place."""
     tab.page.click("#path-key")
     tab.until("flarewright.state.lights[0].keys.length === 1")
     type_into(tab, "path_time", "9")
@@ -1164,7 +1159,7 @@ def key_two_places(tab):
     tab.until("flarewright.state.lights[0].keys.length === 2")
 
 
-def test_a_hand_that_takes_the_light_ends_the_play(tab):
+def test_a_drag_of_the_light_ends_the_playback(tab):
     key_two_places(tab)
     tab.page.click("#path-play")
     tab.until("flarewright.player.at > 0.3 && flarewright.player.playing")
@@ -1182,11 +1177,8 @@ def test_a_hand_that_takes_the_light_ends_the_play(tab):
 
 
 def test_the_command_is_shown_where_the_clipboard_is_kept_from_the_page(tab, tmp_path):
-    tab.page.keyboard.press("Control+s")
-    tab.page.fill("dialog input[name=path]", str(tmp_path / "one"))
-    tab.page.keyboard.press("Enter")
-    tab.until("flarewright.state.clean")
-    # as it is for pages of other machines
+    tab.save_as(tmp_path / "one")
+    # as for pages of other computers
     tab.js("Object.defineProperty(navigator, 'clipboard', {value: undefined, configurable: true})")
     tab.page.click("#export")
     tab.page.click("[role=menuitem]:has-text('Copy as command line')")
@@ -1203,8 +1195,8 @@ def test_the_page_says_that_the_target_is_drawn_by_matrices(tab):
     tab.page.click("[data-compare=side]")
     tab.until("flarewright.view.target")
     assert "drawn by matrices" in words.inner_text()
-    assert "the light stands 9° off it" in words.inner_text()
-    tab.js("flarewright.deed('move_light', {light: 0, x: 24, y: 0})")
+    assert "the light is 9° off it" in words.inner_text()
+    tab.js("flarewright.command('move_light', {light: 0, x: 24, y: 0})")
     tab.until("document.getElementById('target-drawn').textContent.includes('24° off')")
     tab.page.click("[data-compare=physical]")
     assert words.is_hidden()
@@ -1219,13 +1211,13 @@ TARGET_PIXELS = (
 
 
 def target_off(tab, url):
-    """Return how far the shown target is from another one, in mean codes of 255."""
+    """Return the difference of the shown target from another one, in mean codes of 255."""
     shown, other = (np.array(tab.page.evaluate(TARGET_PIXELS, each), dtype=float) for each in (None, url))
     return float(np.abs(shown - other).mean())
 
 
 @pytest.mark.parametrize("compare", ["target", "wipe", "side"])
-def test_the_target_follows_the_hand(tab, compare):
+def test_the_target_follows_the_drag(tab, compare):
     tab.tab("target")
     tab.page.click(f"[data-compare={compare}]")
     tab.until("flarewright.view.target")
@@ -1239,7 +1231,7 @@ def test_the_target_follows_the_hand(tab, compare):
         tab.page.wait_for_timeout(16)
     followed, shown = tab.js("[flarewright.view.stats.targets.length, flarewright.view.stats.shown.length]")
     assert 2 <= followed < shown
-    # what it holds is what it shows, on either side
+    # the target shows the state of the drag, on either side
     off = [away]
     for _ in range(50):
         tab.page.wait_for_timeout(100)
@@ -1250,7 +1242,7 @@ def test_the_target_follows_the_hand(tab, compare):
     assert off[-1] < 0.1
     assert tab.js("flarewright.view.target.width") == 960
     assert away > 2.0
-    # and where it has let go, the target of the project stands, as sharp as ever
+    # after the drag, the project's target is shown at full sharpness
     mouse.move(x - 200, y + 70)
     mouse.up()
     tab.rest()
@@ -1261,7 +1253,7 @@ def test_the_target_follows_the_hand(tab, compare):
     assert target_off(tab, moved) < 0.9
 
 
-def test_a_hand_that_comes_back_leaves_no_target_of_elsewhere(tab):
+def test_a_drag_back_to_its_start_restores_the_target(tab):
     tab.tab("target")
     tab.page.click("[data-compare=wipe]")
     tab.until("flarewright.view.target")
@@ -1274,7 +1266,7 @@ def test_a_hand_that_comes_back_leaves_no_target_of_elsewhere(tab):
     tab.until("flarewright.view.stats.targets.length > 0")
     tab.page.wait_for_timeout(600)
     assert target_off(tab, "/api/target") > 1.0
-    # to the very place where it was taken: no deed follows from it
+    # back to the start of the drag: no command follows
     start = tab.state()["lights"][0]["field_deg"]
     tab.js(f"flarewright.view.drag.now = {start}")
     tab.js("flarewright.view.lightPage(0)")
@@ -1283,7 +1275,7 @@ def test_a_hand_that_comes_back_leaves_no_target_of_elsewhere(tab):
     tab.page.wait_for_timeout(700)
     assert tab.state()["steps"]["at"] == steps
     assert target_off(tab, "/api/target") < 0.1
-    # nor is one shown again that was out of sight while the light was moved
+    # a target that was hidden while the light moved is not shown outdated
     tab.page.click("[data-compare=physical]")
     tab.drag(tab.light(), tab.at(0.3, 0.3))
     tab.page.route("**/api/target*", lambda route: None)
@@ -1293,7 +1285,7 @@ def test_a_hand_that_comes_back_leaves_no_target_of_elsewhere(tab):
 
 
 def test_keys_that_move_the_light_end_the_play(tab):
-    """The picture of the place where it went on to rest had never come."""
+    """The final picture of the last place used to be missing."""
     key_two_places(tab)
     for end in ("ArrowRight", "open"):
         tab.page.click("#path-play")

@@ -1,4 +1,4 @@
-"""Hands that are faster than the editor, and what must follow them: `pytest -m browser`."""
+"""User actions faster than the editor's answers: `pytest -m browser`."""
 
 import json
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flarewright.io.project_file import read_project
+from flarewright.io.project.project_file import read_project
 
 pytest.importorskip("playwright", reason="the extra e2e is not installed")
 pytest.importorskip("starlette", reason="the extra ui is not installed")
@@ -20,7 +20,7 @@ pytestmark = [
 
 
 def delay(tab, ms=300):
-    """Let every change of the project arrive late, as on a busy machine."""
+    """Delay every change of the project, as on a busy computer."""
     tab.js(
         f"(() => {{ const ask = window.fetch; window.fetch = async (path, rest) => {{ if (String(path) === '/api/do') "
         f"await new Promise(done => {{ setTimeout(done, {ms}); }}); return ask(path, rest); }}; }})()"
@@ -28,12 +28,9 @@ def delay(tab, ms=300):
 
 
 def test_what_is_saved_or_exported_is_what_was_typed(tab, tmp_path):
-    """What was typed and saved at once was not in the file in seven of ten tries."""
+    """A value typed just before saving used to be missing in the file in seven of ten tries."""
     file = tmp_path / "shot.toml"
-    tab.page.keyboard.press("Control+s")
-    tab.page.fill("dialog input", str(file))
-    tab.page.keyboard.press("Enter")
-    tab.until("flarewright.state.clean")
+    tab.save_as(file)
     delay(tab)
     tab.page.fill("input[name=intensity]", "3.5")
     tab.page.keyboard.press("Control+s")
@@ -46,7 +43,7 @@ def test_what_is_saved_or_exported_is_what_was_typed(tab, tmp_path):
     tab.page.fill("input[name=intensity]", "1.5")
     exported = read_project(download(tab, "Project file", tmp_path / "exported.toml"))
     assert exported.lights[0].intensity == 1.5
-    # a cell of the prescription too
+    # the same for a cell of the prescription
     tab.tab("lens")
     tab.page.fill("[data-row='2'][data-column=thickness]", "4.25")
     tab.page.keyboard.press("Control+s")
@@ -55,12 +52,12 @@ def test_what_is_saved_or_exported_is_what_was_typed(tab, tmp_path):
 
 
 def test_undo_takes_back_what_was_asked_for_last(tab):
-    """Undo overtook the last of the keys, which was then done behind it."""
+    """Undo used to overtake the last key, which then ran after it."""
     before = tab.state()["lights"][0]["field_deg"]
     delay(tab)
     tab.page.locator("#view").focus()
     for _ in range(20):
-        # held down, for longer than an answer takes
+        # held down for longer than an answer takes
         tab.page.keyboard.down("ArrowRight")
         tab.page.wait_for_timeout(30)
     tab.page.keyboard.up("ArrowRight")
@@ -71,12 +68,12 @@ def test_undo_takes_back_what_was_asked_for_last(tab):
     assert tab.state()["undo"] == ""
     tab.page.keyboard.press("Control+Shift+z")
     tab.until("flarewright.state.undo === 'Move the light'")
-    # nor is any of them lost
+    # no key is lost
     assert tab.state()["lights"][0]["field_deg"][0] == pytest.approx(before[0] + 2.0)
 
 
 def test_undo_while_a_path_plays_can_be_done_again(tab):
-    """It stopped where it was, which was a step of its own: nothing could be done again."""
+    """The stopped position used to be a step, which cleared the redo list."""
     tab.page.click("#path-key")
     tab.until("flarewright.state.lights[0].keys.length === 1")
     tab.page.fill("input[name=path_time]", "3")
@@ -98,7 +95,7 @@ def test_undo_while_a_path_plays_can_be_done_again(tab):
     assert tab.state()["lights"][0]["field_deg"] == place
     tab.page.keyboard.press("Control+Shift+z")
     tab.until("flarewright.state.lights[0].keys.length === 2")
-    # where there is nothing to be done, the picture of the project comes back all the same
+    # without anything to undo, the project's picture is restored all the same
     tab.page.keyboard.press("t")
     tab.until("flarewright.player.playing && flarewright.view.shownGrade === 'moving'")
     tab.page.keyboard.press("Control+Shift+z")
@@ -108,11 +105,11 @@ def test_undo_while_a_path_plays_can_be_done_again(tab):
     assert tab.state()["steps"] == steps
 
 
-def test_the_circle_of_a_wish_goes_with_the_light(tab):
-    """It stood still while the light was dragged, and the target beside it moved."""
+def test_the_circle_of_a_target_moves_with_the_light(tab):
+    """It used to stand still while the light was dragged and the target picture moved."""
     tab.tab("target")
     tab.until("flarewright.view.places.length > 0")
-    tab.js("flarewright.deed('set_wish', {ghost: '8-6', values: {move_mm: 2}})")
+    tab.js("flarewright.command('set_ghost_target', {ghost: '8-6', values: {move_mm: 2}})")
     tab.page.click("[data-compare=side]")
     tab.rest()
     where = "(v => v.line(v.placeOf(v.places.find(one => one.name === '8-6')) + 2))(flarewright.view)"
@@ -120,12 +117,12 @@ def test_the_circle_of_a_wish_goes_with_the_light(tab):
     tab.page.mouse.move(x, y)
     tab.page.mouse.down()
     tab.page.mouse.move(x - 150, y + 90, steps=10)
-    # not the one of before: the hand's own pictures have come
+    # not the previous one: pictures of the drag have arrived
     tab.until("(v => v.mover.live && v.mover.lights && !v.mover.busy() && v.shownGrade === 'final')(flarewright.view)")
     during = tab.js(where)
     tab.page.mouse.up()
     tab.rest()
-    # where it stands then, as the project has it
+    # its place afterwards is that of the project
     assert during == pytest.approx(tab.js(where), abs=1e-3)
     slopes = tab.js("flarewright.state.lights[0].field_deg.map(deg => Math.tan(deg * Math.PI / 180))")
     assert during[0] * slopes[1] == pytest.approx(during[1] * slopes[0], abs=1e-6)
@@ -136,7 +133,7 @@ def test_what_went_wrong_is_not_pushed_out_by_what_went_well(tab):
     for k, words in enumerate(said):
         tab.js(f"import('/static/ui.js').then(ui => ui.toast({json.dumps(words)}, '{'good' if k else 'error'}'))")
     assert tab.page.locator(".toast").all_inner_texts() == [said[0], *said[2:]]
-    # but nothing is pushed out by what was said before
+    # later messages push out earlier ones of the same kind
     for words in ("no", "nor this", "this is new"):
         kind = "info" if words == "this is new" else "error"
         tab.js(f"import('/static/ui.js').then(ui => ui.toast({json.dumps(words)}, '{kind}'))")
@@ -149,21 +146,21 @@ def test_that_the_editor_is_gone_is_said_until_it_is_back(tab):
     gone.wait_for()
     tab.page.fill("input[name=intensity]", "3")
     tab.page.keyboard.press("Enter")
-    # longer than other words stand
+    # it stays longer than other messages
     tab.page.wait_for_timeout(10000)
     assert gone.count() == 1
     tab.editor.start()
     tab.page.locator(".toast.good", has_text="is back").wait_for(timeout=20000)
     assert gone.count() == 0
-    # the browser tells of it too
+    # the browser logs it too
     tab.said[:] = [said for said in tab.said if "net::ERR_" not in said]
 
 
 def test_ghosts_of_the_lens_before_are_none_of_the_next(tab):
-    """What was chosen in the old table had become a rule for another lens' ghost."""
+    """A choice in the old table used to become a rule for another lens' ghost."""
     tab.tab("ghosts")
     assert tab.page.locator("tr[data-ghost]").count() > 5
-    tab.js("flarewright.deed('choose_lens', {lens: 'takumar-50-f1.4'})")
+    tab.js("flarewright.command('choose_lens', {lens: 'takumar-50-f1.4'})")
     tab.until("flarewright.state.lens.name.includes('Takumar')")
     listed = tab.js("fetch('/api/ghosts').then(a => a.json())")
     assert listed["fresh"] or listed["ghosts"] == []
@@ -173,11 +170,11 @@ def test_ghosts_of_the_lens_before_are_none_of_the_next(tab):
 
 
 def test_a_pull_that_is_refused_leaves_the_ghost_where_it_was(tab):
-    """It had stayed where the hand let go, as if it had been wished there."""
+    """It used to stay where the drag ended."""
     tab.tab("target")
-    tab.page.click("#wish-add")
-    tab.until("flarewright.wish === 0")
-    where = "(v => v.toPage(...v.line(flarewright.state.design.wishes[0].place_mm)))(flarewright.view)"
+    tab.page.click("#ghost-target-add")
+    tab.until("flarewright.ghostTarget === 0")
+    where = "(v => v.toPage(...v.line(flarewright.state.design.ghost_targets[0].place_mm)))(flarewright.view)"
     x, y = tab.js(where)
     box = tab.page.locator("#view").bounding_box()
     start = (box["x"] + x, box["y"] + y)
@@ -190,7 +187,7 @@ def test_a_pull_that_is_refused_leaves_the_ghost_where_it_was(tab):
 
 
 def test_a_light_that_another_tab_takes_away_is_held_no_more(tab):
-    """Every move of the hand was a mistake of the page."""
+    """Every move of the drag used to be an error of the page."""
     tab.page.click("#light-add")
     tab.until("flarewright.state.lights.length === 2 && flarewright.light === 1")
     tab.rest()
@@ -211,7 +208,7 @@ def test_a_light_that_another_tab_takes_away_is_held_no_more(tab):
 
 
 def test_zoom_pan_and_wipe_are_reached_by_keys(tab):
-    """They were there for a mouse alone."""
+    """They used to work with a mouse only."""
     view = tab.page.locator("#view")
     view.focus()
     fitted = tab.js("flarewright.view.frame()")
@@ -235,7 +232,7 @@ def test_zoom_pan_and_wipe_are_reached_by_keys(tab):
     for _ in range(30):
         tab.page.keyboard.press("[")
     assert tab.js("flarewright.view.wipe") == 0.0
-    # where pages and lists are scrolled with them, these keys are theirs
+    # these keys still scroll pages and lists
     tab.tab("ghosts")
     tab.page.focus("tr[data-ghost] >> nth=0")
     tab.page.keyboard.press("PageUp")
@@ -244,7 +241,7 @@ def test_zoom_pan_and_wipe_are_reached_by_keys(tab):
 
 
 def test_a_large_page_shows_a_sharp_picture(tab):
-    """On large windows the picture that rests was drawn 960 pixels wide, and stretched."""
+    """In large windows the picture at rest used to be 960 pixels wide, and stretched."""
     small = tab.shown()
     assert small.shape[1] == 960
     tab.page.set_viewport_size({"width": 1900, "height": 1080})
@@ -252,11 +249,11 @@ def test_a_large_page_shows_a_sharp_picture(tab):
     assert tab.js("[flarewright.view.image.width, flarewright.view.image.height]") == tab.js(
         "[flarewright.view.frame().w, flarewright.view.frame().h].map(side => Math.round(side * devicePixelRatio))"
     )
-    # the picture is the same: neither its brightness nor its place has changed
+    # the picture is the same in brightness and place
     large = np.asarray(Image.fromarray(tab.shown()).resize((96, 54), Image.Resampling.BOX), dtype=float)
     both = np.asarray(Image.fromarray(small).resize((96, 54), Image.Resampling.BOX), dtype=float), large
     assert np.abs(both[0] - both[1]).mean() < 0.5
-    # a hand is as fast as ever, and what it lets go of is sharp
+    # a drag is as fast as ever, and its final picture is sharp
     x, y = tab.light()
     mouse = tab.page.mouse
     mouse.move(x, y)
@@ -267,14 +264,14 @@ def test_a_large_page_shows_a_sharp_picture(tab):
     mouse.up()
     tab.rest()
     assert tab.js("flarewright.view.image.width === Math.round(flarewright.view.frame().w * devicePixelRatio)")
-    # who looks closer sees more, as far as the file goes, and 1:1 is one pixel of that to one of the screen
+    # zooming in shows more detail, up to the file's size; 1:1 is one file pixel per screen pixel
     tab.page.keyboard.press("z")
     tab.until("flarewright.view.image.width === 1920")
     assert tab.js("Math.round(flarewright.view.frame().w * devicePixelRatio)") == 1920
 
 
 def doublet(name):
-    """Return a lens of a format whose repairs are told."""
+    """Return a lens file of a format with reported repairs."""
     rows = [("0.01627", "6", "N-BK7"), ("-0.0224", "2.5", "SF5"), ("-0.0077", "90", "")]
     lines = ["MODE SEQ", f"NAME {name}", "UNIT MM", "ENPD 20", "SURF 0", "  DISZ INFINITY"]
     for number, (curvature, gap, glass) in enumerate(rows, start=1):
@@ -284,7 +281,7 @@ def doublet(name):
 
 
 def test_what_was_noticed_in_a_file_goes_with_it_and_words_are_no_files(tab):
-    """Notes of the file before had covered the light, and dragging their words had opened the sheet for files."""
+    """Remarks on the previous file used to cover the light, and dragging their text opened the drop area for files."""
     for name in ("one", "two"):
         drop(tab, f"{name}.zmx", doublet(name).encode())
         tab.until(f"flarewright.state.lens.name === '{name}'")

@@ -1,30 +1,31 @@
-"""A measured flare in the editor: opened, moved, changed by hand, saved; without a browser."""
+"""A measured flare in the editor: opened, moved, overridden, saved; without a browser."""
 
 import numpy as np
 import pytest
 
-from flarewright.editor.deeds import done
-from flarewright.editor.edit_lens import choose_lens
-from flarewright.editor.files import export_picture, ghost_csv, imported, lens_text, open_any
-from flarewright.editor.hand import Hand
-from flarewright.editor.screen import Screen
-from flarewright.editor.session import begin
-from flarewright.editor.sharpening import sharpen
-from flarewright.editor.snapshot import ghosts_of, state_of
-from flarewright.editor.solving import Seeing, Solver
-from flarewright.editor.viewing import outline_png, picked
+from flarewright.editor.commands.lens import choose_lens
+from flarewright.editor.commands.registry import done
+from flarewright.editor.design.search_job import DisplaySettings, Solver
+from flarewright.editor.preview.drag import Drag
+from flarewright.editor.preview.ghost_picking import ghost_csv
+from flarewright.editor.preview.progressive_render import sharpen
+from flarewright.editor.preview.queries import outline_png, picked
+from flarewright.editor.preview.viewport import Screen
+from flarewright.editor.server.page_state import ghost_rows, state_of
+from flarewright.editor.session.files import export_picture, imported, lens_text, open_any
+from flarewright.editor.session.session import begin
 from flarewright.errors import FlarewrightError
-from flarewright.io.exr import read_exr
-from flarewright.io.ghost_model_file import write_ghost_model
-from flarewright.io.half import rounded_to_half
-from flarewright.measure.numbers import NUMBERS, channel_of
-from flarewright.measure.replay import replay
-from flarewright.model.ghost_model import AberrationGhost, GhostModel, Halo, Reference
-from flarewright.optics.constellation import constellation_and_roll
+from flarewright.io.images.exr import read_exr
+from flarewright.io.images.half import rounded_to_half
+from flarewright.io.measurement.ghost_model_file import write_ghost_model
+from flarewright.measure.core.parameter_vector import NUMBERS, channel_of
+from flarewright.measure.replay.model_image import replay_model
+from flarewright.model.measurement.ghost_model import AberrationGhost, GhostModel, Halo, Reference
+from flarewright.optics.lens.field_angles import constellation_and_roll
 
 
 def flare(**facts):
-    """Return a ghost that lies across the axis from the light, one that goes beside it, and a halo."""
+    """Return a model with a ghost opposite to the light, one on its side, and a halo."""
     ghosts = []
     for name, speed, level in (("1", -60.0, 900.0), ("2", 150.0, 400.0)):
         numbers = np.zeros(NUMBERS)
@@ -56,7 +57,7 @@ def screen(path, screen_size):
 
 
 def state(screen):
-    return state_of(screen, Solver(screen.session, lambda: Seeing(screen.session.view, 0.0)))
+    return state_of(screen, Solver(screen.session, lambda: DisplaySettings(screen.session.view, 0.0)))
 
 
 def test_it_opens_with_its_whole_frame_and_a_light_that_was_photographed(path):
@@ -70,6 +71,16 @@ def test_it_opens_with_its_whole_frame_and_a_light_that_was_photographed(path):
     assert 0.0 < roll < 90.0
 
 
+def test_it_opens_with_the_sensor_of_its_captures(tmp_path):
+    write_ghost_model(tmp_path / "model.json", flare(sensor_width_mm=22.5))
+    project, _ = open_any(str(tmp_path / "model.json"))
+    assert project.camera.sensor_mm == pytest.approx((22.5, 22.5 * 1080 / 1920))
+    # a project that was saved before the model knew its sensor
+    saved = tmp_path / "old.toml"
+    saved.write_text('lens = "model.json"\n[camera]\nsize_px = [320, 180]\n[[lights]]\nfield_deg = [40.0, 0.0]\n')
+    assert open_any(str(saved))[0].camera.sensor_mm == pytest.approx((22.5, 22.5 * 180 / 320))
+
+
 def test_the_screen_shows_the_replay_and_lists_its_ghosts(screen):
     picture = screen.picture
     assert screen.problem == ""
@@ -77,37 +88,51 @@ def test_the_screen_shows_the_replay_and_lists_its_ghosts(screen):
     slopes = np.tan(np.radians(screen.session.project.lights[0].field_deg))
     angle, roll = (float(each) for each in constellation_and_roll(np.eye(3), [*slopes, 1.0]))
     height, width = picture.ghosts.shape[:2]
-    told = replay(flare(), angle, roll_deg=roll, size_px=(width, height))
-    assert np.abs(picture.ghosts - told[1].pixels).max() <= 1e-4 * told[1].pixels.max()
-    assert np.abs(picture.ghosts + picture.rest - told[0].pixels).max() <= 1e-4 * told[0].pixels.max()
-    assert [row["name"] for row in ghosts_of(screen)["ghosts"]] == ["1", "2"]
+    reported = replay_model(flare(), angle, roll_deg=roll, size_px=(width, height))
+    assert np.abs(picture.ghosts - reported[1].pixels).max() <= 1e-4 * reported[1].pixels.max()
+    assert np.abs(picture.ghosts + picture.rest - reported[0].pixels).max() <= 1e-4 * reported[0].pixels.max()
+    assert [row["name"] for row in ghost_rows(screen)["ghosts"]] == ["1", "2"]
     assert "ghost,flux_mm2" in ghost_csv(screen.seen)
 
 
-def test_the_page_is_told_what_it_draws_the_lights_handle_by(screen):
-    told = state(screen)["lens"]
-    assert told["measured"]
-    assert told["rows"] == []
-    assert told["problem"] == ""
+def test_the_page_gets_the_data_for_the_lights_handle(screen):
+    reported = state(screen)["lens"]
+    assert reported["measured"]
+    assert reported["rows"] == []
+    assert reported["problem"] == ""
     pitch = 36.0 / 160.0
-    assert told["facts"]["efl"] == pytest.approx(170.0 * pitch)
-    assert told["axis_mm"] == pytest.approx([4.0 * pitch, 3.0 * pitch])
-    # at 10 degrees, the fifth step, the image lies so much nearer than focal length times tangent
-    assert told["distortion"][4] == pytest.approx(1.0 - 0.1 * np.tan(np.radians(10.0)) ** 2, abs=1e-5)
-    # farther out must be farther out: where 1 - 0.3 t^2 is 0 the table ends
-    assert 2.0 * len(told["distortion"]) <= np.degrees(np.arctan(0.3**-0.5)) + 2.0
+    assert reported["facts"]["efl"] == pytest.approx(170.0 * pitch)
+    assert reported["axis_mm"] == pytest.approx([4.0 * pitch, 3.0 * pitch])
+    # at 10 degrees, the fifth step, the image is nearer than focal length times tangent by this factor
+    assert reported["distortion"][4] == pytest.approx(1.0 - 0.1 * np.tan(np.radians(10.0)) ** 2, abs=1e-5)
+    # the table ends where heights would decrease: 1 - 0.3 t^2 reaches 0
+    assert 2.0 * len(reported["distortion"]) <= np.degrees(np.arctan(0.3**-0.5)) + 2.0
 
 
-def test_a_hand_moves_its_light(screen):
+def test_a_drag_moves_its_light(screen):
     session = screen.session
-    moved = Hand(screen).picture(lambda project: done(project, "move_light", {"light": 0, "x": -8.0, "y": 3.0})[0],
+    moved = Drag(screen).picture(lambda project: done(project, "move_light", {"light": 0, "x": -8.0, "y": 3.0})[0],
                                  session.revision)  # fmt: skip
     assert moved is not None
     assert moved.project.lights[0].field_deg == (-8.0, 3.0)
     assert moved.jpeg[:2] == b"\xff\xd8"
-    with pytest.raises(FlarewrightError, match="cannot tell the flare at"):
-        Hand(screen).picture(lambda project: done(project, "move_light", {"light": 0, "x": 50.0, "y": 0.0})[0],
-                             session.revision)  # fmt: skip
+    # beyond the photographed range the limit is drawn
+    limit = [
+        Drag(screen).picture(lambda project, x=x: done(project, "move_light", {"light": 0, "x": x, "y": 0.0})[0],
+                             session.revision)
+        for x in (25.0, 50.0)
+    ]  # fmt: skip
+    assert limit[1].project.lights[0].field_deg == (50.0, 0.0)
+    assert limit[0].jpeg == limit[1].jpeg
+
+
+def test_a_light_at_rest_beyond_the_photographed_range_shows_the_limit_and_says_so(screen):
+    screen.session.do("move_light", {"light": 0, "x": 40.0, "y": 0.0})
+    assert screen.wait(60.0)
+    assert screen.problem == ""
+    assert any("at the limit, 25 degrees" in line for line in state(screen)["remarks"])
+    screen.session.do("set_fields", {"values": {"f_number": 4.0}})
+    assert screen.session.project.f_number == 4.0
 
 
 def test_a_ghost_is_found_under_the_pointer_and_muted(screen):
@@ -120,7 +145,7 @@ def test_a_ghost_is_found_under_the_pointer_and_muted(screen):
     assert screen.problem == ""
     column, row = (int(part * side) for part, side in zip(ghost.centre, before.shape[1::-1], strict=True))
     assert screen.picture.ghosts[row, column].max() < 0.01 * before[row, column].max()
-    assert next(each for each in ghosts_of(screen)["ghosts"] if each["name"] == "1")["muted"]
+    assert next(each for each in ghost_rows(screen)["ghosts"] if each["name"] == "1")["muted"]
 
 
 def test_what_only_a_lens_has_is_refused_and_changes_nothing(screen, path):
@@ -171,6 +196,6 @@ def test_it_is_saved_beside_its_project_exported_and_dropped(screen, tmp_path, p
 def test_a_lens_in_its_place_keeps_the_light_in_the_picture(path):
     project, _ = open_any(path)
     chosen = choose_lens(project, "heliar-tronnier")
-    # from 38 mm to 99: the image stays where it was
+    # from 38 mm to 99: the image keeps its place
     near, far = (np.tan(np.radians(each.lights[0].field_deg)) for each in (project, chosen))
     assert far == pytest.approx(near * (170.0 * 36.0 / 160.0) / 99.236, rel=1e-3)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flarewright.io.ghost_model_file import write_ghost_model
+from flarewright.io.measurement.ghost_model_file import write_ghost_model
 
 pytest.importorskip("playwright", reason="the extra e2e is not installed")
 pytest.importorskip("starlette", reason="the extra ui is not installed")
@@ -19,7 +19,7 @@ pytestmark = [
 
 @pytest.fixture
 def opened(tab, tmp_path):
-    """Drop a measured flare on a page that shows a lens."""
+    """Drop a measured flare on a page with a lens."""
     write_ghost_model(tmp_path / "model.json", flare())
     drop(tab, "mine.json", (tmp_path / "model.json").read_bytes())
     tab.until("flarewright.state.lens.measured")
@@ -27,24 +27,24 @@ def opened(tab, tmp_path):
     return tab
 
 
-def test_its_handle_lies_on_its_light_and_takes_it_along(opened):
+def test_its_handle_lies_on_its_light_and_moves_it(opened):
     tab = opened
     start = tab.light()
     tab.drag(start, (start[0] - 330, start[1] + 60), steps=30, hold_ms=25)
     tab.rest()
     assert not tab.state()["picture"]["problem"]
-    # the halo is brightest where its light is, and warmer than the borders of ghosts, which the codec sharpens
+    # the halo is brightest at its light, and warmer than the ghost borders, which the codec sharpens
     picture = tab.shown()[..., 0].astype(float)
     rows, columns = np.nonzero(picture >= picture.max() - 1.0)
     x, y, w, h = tab.frame()
     seen = x + (columns.mean() + 0.5) / picture.shape[1] * w, y + (rows.mean() + 0.5) / picture.shape[0] * h
     assert seen == pytest.approx(tab.light(), abs=4.0)
     assert tab.light() == pytest.approx((start[0] - 330, start[1] + 60), abs=2.0)
-    # out of what was photographed the last good picture stays, and this is said
+    # outside the captured range the picture is that of the limit, with a remark
     tab.page.fill("[name=light_x]", "60")
     tab.page.press("[name=light_x]", "Enter")
-    tab.until("flarewright.state.picture.problem")
-    assert "cannot tell the flare at" in tab.page.inner_text("#problem")
+    tab.until("flarewright.state.remarks.some(remark => remark.includes('it is drawn at the limit'))")
+    assert not tab.state()["picture"]["problem"]
     tab.page.click("#undo")
     tab.rest()
 
@@ -69,7 +69,7 @@ def test_its_panels_say_why_they_are_empty_and_its_ghosts_are_muted(opened):
     darker = before - tab.shown().astype(int)
     assert darker.max() > 20
     assert darker.min() > -20
-    # back to the lens: what it has is there again
+    # back to the lens: its controls are shown again
     tab.page.click("#undo")
     tab.page.click("#undo")
     tab.until("!flarewright.state.lens.measured")

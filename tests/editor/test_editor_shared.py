@@ -1,26 +1,26 @@
-"""The path of a light, what hides lights, chosen pictures, and two editors beside each other; without a browser."""
+"""Light paths, occluders, chosen pictures, and two editors of one project; without a browser."""
 
 import os
 
 import numpy as np
 import pytest
 
-from flarewright.editor import files
-from flarewright.editor import session as session_module
-from flarewright.editor.deeds import done
-from flarewright.editor.edit_path import length_s
-from flarewright.editor.history import before_mask
-from flarewright.editor.imports import take_in
-from flarewright.editor.session import begin
-from flarewright.editor.shown import png
-from flarewright.editor.studio import pictured
+from flarewright.editor.commands.light_path import length_s
+from flarewright.editor.commands.registry import done
+from flarewright.editor.preview.display_image import png
+from flarewright.editor.preview.render_picture import pictured
+from flarewright.editor.server.uploads import take_in
+from flarewright.editor.session import files
+from flarewright.editor.session import session as session_module
+from flarewright.editor.session.history import before_mask
+from flarewright.editor.session.session import begin
 from flarewright.errors import FlarewrightError, ProjectError
-from flarewright.io.project_file import read_project
+from flarewright.io.project.project_file import read_project
 from flarewright.model import Holdout, LightKey
 
 
-def do(project, deed, /, **values):
-    return done(project, deed, values)[0]
+def do(project, command, /, **values):
+    return done(project, command, values)[0]
 
 
 def test_a_path_of_keys(project):
@@ -29,10 +29,10 @@ def test_a_path_of_keys(project):
     keyed = do(do(keyed, "move_light", light=0, x=-2.0, y=1.0), "set_key", light=0, at_s=2.0)
     keyed = do(keyed, "set_key", light=0, at_s=3.0, field_deg=[-2.0, -3.0])
     assert length_s(keyed) == 3.0
-    # straight lines between, and rest before and behind
+    # straight lines between keys, and rest before and after
     places = {at: do(keyed, "go_to", at_s=at).lights[0].field_deg for at in (0.0, 0.5, 1.0, 2.5, 9.0)}
     assert places == {0.0: (6.0, 3.0), 0.5: (4.0, 2.5), 1.0: (2.0, 2.0), 2.5: (-2.0, -1.0), 9.0: (-2.0, -3.0)}
-    # a key at the time of another takes its place; one that is moved keeps the order
+    # a key at the same time replaces the old one; a moved key keeps the order
     again = do(keyed, "set_key", light=0, at_s=2.004)
     assert len(again.lights[0].keyframes) == 3
     moved = do(keyed, "move_key", light=0, number=0, at_s=2.5)
@@ -42,7 +42,7 @@ def test_a_path_of_keys(project):
     assert len(do(keyed, "remove_key", light=0, number=1).lights[0].keyframes) == 2
     cleared = do(keyed, "clear_keys", light=0)
     assert cleared.lights[0].keyframes == ()
-    # the picture is that of the light where it is; its path draws nothing
+    # the picture is that of the light's place; the path has no effect on it
     assert pictured(keyed) == pictured(cleared)
     for name, values in (("set_key", {"light": 5, "at_s": 0.0}), ("remove_key", {"light": 0, "number": 3})):
         with pytest.raises(ProjectError, match="there is no"):
@@ -59,10 +59,10 @@ def test_a_path_is_kept_in_the_project_file(project, tmp_path):
     path.write_text(path.read_text().replace("at_s = 1.5", "at_s = 0.5"))
     with pytest.raises(ProjectError, match=r"keyframes must rise in time: 0.5 s follows 0.5 s"):
         read_project(path)
-    # another lens sees the light at the same places of the picture all the way
+    # with another lens the light keeps its places in the picture
     other = do(keyed, "choose_lens", lens="biotar-50-f1.4").lights[0]
     assert other.keyframes[0].field_deg == other.field_deg
-    session.keeper.close()
+    session.writer.close()
 
 
 def test_what_hides_lights(project):
@@ -98,7 +98,7 @@ def test_pictures_are_taken_for_what_they_were_chosen_for(tmp_path):
         with pytest.raises(FlarewrightError):
             take_in(session, name, data, use)
     assert session.project == before
-    session.keeper.close()
+    session.writer.close()
 
 
 def test_the_rotation_of_blades_turns_no_image_that_takes_their_place(tmp_path):
@@ -106,11 +106,11 @@ def test_the_rotation_of_blades_turns_no_image_that_takes_their_place(tmp_path):
     white = png(np.full((8, 8, 3), 255, dtype=np.uint8))
     grey = png(np.full((8, 8, 3), 128, dtype=np.uint8))
     assert session.project.iris.rotation_deg == 10.0
-    (told,) = take_in(session, "a.png", white, "mask")
-    assert told.startswith("the blades were turned by 10°; the image stands as it was drawn")
+    (reported,) = take_in(session, "a.png", white, "mask")
+    assert reported.startswith("the blades were rotated by 10°; the image is not rotated")
     assert session.project.iris.rotation_deg == 0.0
     assert before_mask(session.history).iris.rotation_deg == 10.0
-    # one that was turned by hand is gone on with as it stands
+    # a rotated image keeps its rotation
     session.do("set_iris", {"values": {"rotation_deg": 30.0}})
     assert take_in(session, "b.png", grey, "mask") == ()
     assert session.project.iris.rotation_deg == 30.0
@@ -119,89 +119,89 @@ def test_the_rotation_of_blades_turns_no_image_that_takes_their_place(tmp_path):
         session.undo()
     assert (session.project.iris.mask, session.project.iris.rotation_deg) == (None, 10.0)
     assert before_mask(session.history) is None
-    # blades that stand upright say nothing, and a project that begins with an image had none
+    # unrotated blades cause no message, and neither does a project that starts with an image
     session.do("set_iris", {"values": {"rotation_deg": 0.0}})
     assert take_in(session, "a.png", white, "mask") == ()
     session.put(session.project, "Open", begins=True)
     session.put(session.project.replace(f_number=11.0), "Open", begins=True)
     assert before_mask(session.history) is None
-    session.keeper.close()
+    session.writer.close()
 
 
 def test_two_editors_of_one_project_do_not_fight(tmp_path):
-    first, told = begin("tessar-brendel")
-    assert told == ""
-    second, told = begin("tessar-brendel")
-    assert told.startswith("Another editor has this open too")
-    assert first.keeper.path != second.keeper.path
+    first, reported = begin("tessar-brendel")
+    assert reported == ""
+    second, reported = begin("tessar-brendel")
+    assert reported.startswith("Another editor has this open too")
+    assert first.writer.path != second.writer.path
     first.do("set_iris", {"values": {"blades": 8}})
     second.do("set_iris", {"values": {"blades": 5}})
     path = first.save(str(tmp_path / "shot.toml"))
-    # the second one is told that there is a file of that name, and may save over it all the same
+    # the second editor reports the existing file, and may overwrite it
     with pytest.raises(ProjectError, match=r"shot.toml is there already; save again to overwrite it, or .* another"):
         second.save(str(path))
     assert read_project(path).iris.blades == 8
     second.save(str(path))
-    # which the first is told once
+    # the first one reports this once
     first.do("set_iris", {"values": {"blades": 9}})
     with pytest.raises(ProjectError, match=r"shot.toml was changed by another program .* save again to overwrite it"):
         first.save(str(path))
     assert read_project(path).iris.blades == 5
     first.save(str(path))
     assert read_project(path).iris.blades == 9
-    # what is not saved in a file is kept for each by itself
+    # unsaved changes are separate
     first.do("set_iris", {"values": {"blades": 11}})
     second.do("set_iris", {"values": {"blades": 7}})
-    first.keeper.close()
-    second.keeper.close()
-    # each goes on where it was
+    first.writer.close()
+    second.writer.close()
+    # each resumes its own session
     again, _ = begin("tessar-brendel")
     beside, _ = begin("tessar-brendel")
     assert [one.history.present.iris.blades for one in (again, beside)] == [11, 7]
-    again.keeper.close()
-    beside.keeper.close()
+    again.writer.close()
+    beside.writer.close()
 
 
 def turned(path):
-    """Return what another program makes of a project file."""
+    """Return a project file as changed by another program."""
     text = path.read_text()
     return text.replace("blades = ", "rotation_deg = 5.0\nblades = ", 1).replace("\nrotation_deg = 0.0", "")
 
 
 def test_what_others_saved_meanwhile_is_never_overwritten_unasked(tmp_path):
-    """Neither by a session that was cut off, nor after undo of Open, nor where the clock tells no change."""
+    """In an interrupted session, after undo of Open, and with equal file times."""
     one, two = begin("tessar-brendel")[0], begin("heliar-tronnier")[0]
     path, other = one.save(str(tmp_path / "shot.toml")), two.save(str(tmp_path / "other.toml"))
-    two.keeper.close()
+    two.writer.close()
     one.do("set_iris", {"values": {"blades": 9}})
     one.open(str(other))
     one.do("set_iris", {"values": {"blades": 7}})
-    one.keeper.close()
+    one.writer.close()
     times = path.stat()
     changed = turned(path)
     path.write_text(changed)
     os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
     again = begin("tessar-brendel")[0]
     assert (again.file, again.clean) == (str(other), False)
-    # what is there was saved by this session: nothing to ask
+    # the present contents were saved by this session: no question
     again.save(str(other))
     for _ in range(2):
         again.undo()
     assert (again.file, again.project.iris.blades) == (str(path), 9)
     with pytest.raises(ProjectError, match=r"shot.toml was changed by another program since it was opened or saved"):
         again.save(str(path))
-    # it changes once more before the next try
+    # it changes once more before the second attempt
     path.write_text(changed.replace("rotation_deg = 5.0", "rotation_deg = 6.0"))
     with pytest.raises(ProjectError, match="save again to overwrite"):
         again.save(str(path))
     assert read_project(path).iris.rotation_deg == 6.0
     again.save(str(path))
     assert read_project(path).iris.blades == 9
-    again.keeper.close()
+    again.writer.close()
 
 
 def after(monkeypatch, module, name, call, work):
-    """Let another program do something right after the so-many-th call of a function of ours."""
+    """Let another program act right after the n-th call of a function."""
     ours, calls = getattr(module, name), []
 
     def both(*values, **named):
@@ -219,7 +219,7 @@ def test_what_others_save_while_this_is_written_is_not_overwritten(tmp_path, mon
     path = session.save(str(tmp_path / "shot.toml"))
     theirs = turned(path)
     session.do("set_iris", {"values": {"blades": 9}})
-    # changed between the first look and the last
+    # changed between the first check and the last
     with monkeypatch.context() as patch:
         after(patch, files, "_write_bytes", 1, lambda: path.write_text(theirs))
         with pytest.raises(ProjectError, match=r"shot.toml was changed by another program since .* save again"):
@@ -228,7 +228,7 @@ def test_what_others_save_while_this_is_written_is_not_overwritten(tmp_path, mon
     assert not session.clean
     session.save(str(path))
     assert read_project(path).iris.blades == 9
-    # one that comes where none was, before the last look and right after it
+    # a new file appears, before the last check and right after it
     for name, module, call, function in (("a", files, 1, "_write_bytes"), ("b", session_module, 2, "stamp_of")):
         new = tmp_path / f"{name}.toml"
         with monkeypatch.context() as patch:
@@ -236,15 +236,15 @@ def test_what_others_save_while_this_is_written_is_not_overwritten(tmp_path, mon
             with pytest.raises(ProjectError, match=f"{new.name} is there already; save again to overwrite it"):
                 session.save(str(new))
         assert new.read_text() == theirs
-    # and nothing half written is left
+    # no partial file remains
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a.toml", "b.toml", "shot.toml", "state"]
     session.save(str(tmp_path / "b.toml"))
     assert read_project(tmp_path / "b.toml").iris.blades == 9
-    session.keeper.close()
+    session.writer.close()
 
 
 def test_what_others_save_right_after_is_theirs(tmp_path, monkeypatch):
-    """What was written is known by its own bytes, and what was read by those that lay there before."""
+    """Written contents are identified by their bytes, and read ones by the bytes before reading."""
     session = begin("tessar-brendel")[0]
     path = session.save(str(tmp_path / "shot.toml"))
     theirs = turned(path)
@@ -255,7 +255,7 @@ def test_what_others_save_right_after_is_theirs(tmp_path, monkeypatch):
     session.do("set_iris", {"values": {"blades": 7}})
     with pytest.raises(ProjectError, match="was changed by another program"):
         session.save(str(path))
-    session.keeper.close()
+    session.writer.close()
     with monkeypatch.context() as patch:
         after(patch, session_module, "open_any", 1, lambda: path.write_text(theirs.replace("5.0", "6.0")))
         late = begin(str(path))[0]
@@ -263,7 +263,7 @@ def test_what_others_save_right_after_is_theirs(tmp_path, monkeypatch):
     with pytest.raises(ProjectError, match="was changed by another program"):
         late.save(str(path))
     assert read_project(path).iris.rotation_deg == 6.0
-    late.keeper.close()
+    late.writer.close()
 
 
 def test_without_a_place_for_its_state_the_editor_works_all_the_same(tmp_path, monkeypatch):
@@ -274,6 +274,6 @@ def test_without_a_place_for_its_state_the_editor_works_all_the_same(tmp_path, m
     heard = []
     session.listeners.append(heard.append)
     session.do("set_iris", {"values": {"blades": 8}})
-    session.keeper.close()
+    session.writer.close()
     assert session.project.iris.blades == 8
     assert any("The autosave failed" in event.get("text", "") for event in heard)

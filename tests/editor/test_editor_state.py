@@ -1,33 +1,34 @@
-"""History, autosave and deeds of the editor, without a browser."""
+"""History, autosave and commands of the editor, without a browser."""
 
+import errno
 import json
 import threading
 
 import pytest
 
-from flarewright.editor import history as past
-from flarewright.editor.autosave import Saved, autosave_path, read_autosave, write_autosave
-from flarewright.editor.deeds import DEEDS, done
-from flarewright.editor.edit_ghosts import Hand, hand, soloed
-from flarewright.editor.edit_lens import own_lens, prescription, table_of
-from flarewright.editor.edit_wishes import direction, new_discs, target_project, wish_names
-from flarewright.editor.imports import take_in
-from flarewright.editor.jobs import Gate, Lane
-from flarewright.editor.session import begin
-from flarewright.editor.view import View
+from flarewright.editor.commands.design_targets import direction, ghost_target_names, new_discs, target_project
+from flarewright.editor.commands.ghosts import GhostOverride, override_of, soloed
+from flarewright.editor.commands.lens import own_lens, prescription, table_of
+from flarewright.editor.commands.registry import COMMANDS, done
+from flarewright.editor.common.latest_job import Lane
+from flarewright.editor.server.uploads import take_in
+from flarewright.editor.session import history as past
+from flarewright.editor.session.autosave import Saved, autosave_path, read_autosave, write_autosave
+from flarewright.editor.session.session import begin
+from flarewright.editor.session.view_settings import View
 from flarewright.errors import FlarewrightError
-from flarewright.io.library import lens_path
-from flarewright.io.project_file import read_project
+from flarewright.io.lens.library import lens_path
+from flarewright.io.project.project_file import read_project
 from flarewright.model import BlackBody, Light, PerRow, Preset, QuarterWave, Stop, Surface
-from flarewright.render.prepare import as_lens, first_order, settle
+from flarewright.render.scene.resolve import first_order, open_lens, resolve_project
 
 
-def do(project, deed, /, **values):
-    return done(project, deed, values)[0]
+def do(project, command, /, **values):
+    return done(project, command, values)[0]
 
 
 def test_undo_and_redo_walk_the_same_projects(project):
-    history = past.begun(project)
+    history = past.started(project)
     for k in range(5):
         history = past.committed(history, do(history.present, "move_light", light=0, x=k, y=1.0), "Move the light")
     shown = [moment.project for moment in history.moments]
@@ -43,8 +44,8 @@ def test_undo_and_redo_walk_the_same_projects(project):
     assert past.redone(history) == history
 
 
-def test_a_deed_after_undo_forgets_what_was_undone(project):
-    history = past.committed(past.begun(project), do(project, "move_light", light=0, x=1, y=1), "a")
+def test_a_command_after_undo_drops_the_redo_list(project):
+    history = past.committed(past.started(project), do(project, "move_light", light=0, x=1, y=1), "a")
     other = do(project, "move_light", light=0, x=2, y=2)
     history = past.committed(past.undone(history), other, "b")
     assert [moment.label for moment in history.moments] == ["Open", "b"]
@@ -52,18 +53,18 @@ def test_a_deed_after_undo_forgets_what_was_undone(project):
 
 
 def test_one_stroke_is_one_step_and_nothing_is_none(project):
-    history = past.begun(project)
+    history = past.started(project)
     for x in (1.0, 2.0, 3.0):
         history = past.committed(history, do(project, "move_light", light=0, x=x, y=0.0), "Move", "stroke")
     assert len(history.moments) == 2
     assert past.undone(history).present == project
     assert past.committed(history, history.present, "again") is history
-    # the first moment is never replaced, whatever its group
-    assert len(past.committed(past.begun(project), history.present, "Move", "").moments) == 2
+    # the first state is never replaced, whatever its group
+    assert len(past.committed(past.started(project), history.present, "Move", "").moments) == 2
 
 
 def test_history_has_an_end(project):
-    history = past.begun(project)
+    history = past.started(project)
     for k in range(past.MOST + 30):
         history = past.committed(history, do(project, "move_light", light=0, x=k / 10.0, y=0.0), str(k))
     assert len(history.moments) == past.MOST
@@ -71,56 +72,101 @@ def test_history_has_an_end(project):
 
 
 def test_autosave_gives_everything_back(project, tmp_path):
-    history = past.committed(past.begun(project), do(project, "set_cell", row=0, column="radius", text="33"), "Edit")
-    history = past.committed(history, do(history.present, "set_wish", ghost="4-1", values={"move_mm": 2.0}), "Wish")
+    history = past.committed(past.started(project), do(project, "set_cell", row=0, column="radius", text="33"), "Edit")
+    history = past.committed(
+        history, do(history.present, "set_ghost_target", ghost="4-1", values={"move_mm": 2.0}), "Wish"
+    )
     saved = Saved(past.undone(history), View(look="filmic", exposure_stops=3.5), "shot.toml", clean=False)
     path = tmp_path / "a" / "x.json"
     write_autosave(path, saved)
     assert read_autosave(path) == saved
 
 
-@pytest.mark.parametrize("text", ["", "{", '{"version": 1}', '{"version": 7}', "[1]"])
+@pytest.mark.parametrize("text", ["", "{", '{"version": 1}', '{"version": 7}', "[1]", "[" * 100_000])
 def test_a_damaged_autosave_is_no_obstacle(text, tmp_path):
     path = tmp_path / "x.json"
     path.write_text(text)
     assert read_autosave(path) is None
 
 
+def test_a_changed_number_in_an_autosave_is_noticed(project, tmp_path):
+    path = tmp_path / "x.json"
+    saved = Saved(past.started(project), View(), None, clean=False)
+    write_autosave(path, saved)
+    text = path.read_text("utf-8")
+    path.write_text(text.replace('"clean": false', '"clean": true '))
+    assert read_autosave(path) is None
+    # releases before the digest
+    path.write_text(text.splitlines()[0])
+    assert read_autosave(path) == saved
+
+
+@pytest.mark.parametrize("what", [None, "tessar-brendel"])
+def test_a_damaged_autosave_is_kept_and_named(what):
+    session, _ = begin(what)
+    session.do("move_light", {"light": 0, "x": 3.0, "y": 2.0})
+    session.writer.close()
+    path = session.writer.path
+    damaged = path.read_bytes()[:-1000]
+    path.write_bytes(damaged)
+    again, reported = begin(what)
+    assert str(path) in reported
+    assert path.with_suffix(".damaged").read_bytes() == damaged
+    again.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
+    again.writer.close()
+    resumed, reported = begin(what)
+    assert resumed.project.lights[0].field_deg == (4.0, 2.0)
+    assert str(path) not in reported
+    resumed.writer.close()
+
+
+def test_a_file_system_without_locks_keeps_one_autosave(monkeypatch):
+    import fcntl
+
+    def refuse(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    session, _ = begin(None)
+    assert session.writer.number == 1
+    session.writer.close()
+
+
 def test_a_session_goes_on_where_it_was_cut_off(project):
-    session, told = begin(None)
-    assert told == ""
+    session, reported = begin(None)
+    assert reported == ""
     session.do("move_light", {"light": 0, "x": 3.0, "y": 2.0})
     session.do("set_iris", {"values": {"blades": 8}})
     session.set_view({"look": "filmic"})
-    session.keeper.close()
-    # the process is killed here: nothing of it is asked again
-    again, told = begin(None)
+    session.writer.close()
+    # the process is killed here: no further call
+    again, reported = begin(None)
     assert again.history == session.history
     assert again.view == session.view
-    assert "undo leads back" in told
+    assert "undo leads back" in reported
     again.undo()
     again.undo()
     assert again.project.lights[0].field_deg == (8.0, 4.4)
 
 
 def test_without_a_name_it_goes_on_with_what_was_cut_off(tmp_path):
-    """Also where it had been begun with a lens or a file; not where that was saved, or is open in another editor."""
-    begin(None)[0].keeper.close()
+    """Also a session started with a lens or a file; not a saved one, or one open in another editor."""
+    begin(None)[0].writer.close()
     session, _ = begin("tessar-brendel")
     session.do("move_light", {"light": 0, "x": 3.0, "y": 2.0})
     session.save(str(tmp_path / "shot"))
     session.do("set_iris", {"values": {"blades": 8}})
-    session.keeper._lane.wait(5.0)
+    session.writer._lane.wait(5.0)
     beside, _ = begin(None)
     assert beside.project != session.project
-    beside.keeper.close()
-    session.keeper.close()
-    again, told = begin(None)
+    beside.writer.close()
+    session.writer.close()
+    again, reported = begin(None)
     assert again.history == session.history
     assert again.file == session.file
-    assert "undo leads back" in told
+    assert "undo leads back" in reported
     again.save(str(tmp_path / "shot"))
-    again.keeper.close()
+    again.writer.close()
     assert begin(None)[0].project != session.project
 
 
@@ -128,14 +174,14 @@ def test_saving_makes_the_autosave_clean_and_the_file_wins(project, tmp_path):
     session, _ = begin("tessar-brendel")
     session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
     path = session.save(str(tmp_path / "shot"))
-    session.keeper.close()
+    session.writer.close()
     assert path.name == "shot.toml"
     assert read_project(path) == session.project
     again, _ = begin(str(path))
     assert again.project == session.project
     assert again.clean
     again.do("move_light", {"light": 0, "x": 9.0, "y": 2.0})
-    again.keeper.close()
+    again.writer.close()
     third, _ = begin(str(path))
     assert third.project.lights[0].field_deg == (9.0, 2.0)
     assert third.file == str(path)
@@ -154,17 +200,17 @@ def test_undo_of_open_leads_back_to_the_file(tmp_path):
     session.redo()
     assert session.file is None
     session.undo()
-    session.keeper.close()
+    session.writer.close()
     again, _ = begin(None)
     assert again.file == str(path)
     again.redo()
     assert again.file is None
     again.undo()
-    # saved under another name, it goes on with that one, and so do the steps before
+    # after saving under another name, that is the file of this state and the earlier ones
     other = again.save(str(tmp_path / "other.toml"))
     again.undo()
     assert again.file == str(other)
-    again.keeper.close()
+    again.writer.close()
 
 
 def test_what_is_undone_back_to_what_was_saved_is_saved(tmp_path):
@@ -181,25 +227,25 @@ def test_what_is_undone_back_to_what_was_saved_is_saved(tmp_path):
     session.save(str(path))
     session.undo()
     assert not session.clean
-    session.keeper.close()
-    # also in the next session, for the file says what it holds
+    session.writer.close()
+    # also in the next session, as the file has these contents
     again, _ = begin(None)
     assert again.project == session.project
     assert not again.clean
     again.redo()
     assert again.clean
-    # unless somebody else has changed it meanwhile
+    # unless another program has changed it meanwhile
     again.undo()
-    again.keeper.close()
+    again.writer.close()
     path.write_text(path.read_text() + "\n# a remark")
     third, _ = begin(None)
     third.redo()
     assert third.project == read_project(path)
     assert not third.clean
-    third.keeper.close()
+    third.writer.close()
 
 
-def test_another_project_is_told_from_a_change(tmp_path):
+def test_another_project_differs_from_a_change(tmp_path):
     session, _ = begin(None)
     session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
     path = session.save(str(tmp_path / "shot"))
@@ -217,11 +263,11 @@ def test_another_project_is_told_from_a_change(tmp_path):
     session.open(str(path))
     take_in(session, "other.toml", path.read_bytes().replace(b"4.0", b"5.0"))
     assert session.opened == 4
-    session.keeper.close()
+    session.writer.close()
     again, _ = begin(None)
     again.undo()
     assert again.opened == 1
-    again.keeper.close()
+    again.writer.close()
 
 
 @pytest.mark.parametrize(
@@ -232,15 +278,15 @@ def test_another_project_is_told_from_a_change(tmp_path):
         ("shots/one.toml", "there is no file and no lens 'shots/one.toml': the panel Library shows every lens; a file"),
     ],
 )
-def test_what_cannot_be_opened_is_told_in_the_pages_words(text, said):
+def test_errors_of_open_use_the_pages_words(text, said):
     session, _ = begin(None)
-    with pytest.raises(FlarewrightError) as told:
+    with pytest.raises(FlarewrightError) as reported:
         session.open(text)
-    assert str(told.value).startswith(said)
-    session.keeper.close()
+    assert str(reported.value).startswith(said)
+    session.writer.close()
 
 
-def test_a_project_whose_lens_is_gone_is_told_without_a_command(tmp_path):
+def test_a_missing_lens_is_reported_without_a_command(tmp_path):
     text = 'schema_version = 1\nlens = "my-lens.toml"\n[[lights]]\nfield_deg = [3, 2]\n'
     (tmp_path / "shot.toml").write_text(text)
     session, _ = begin(None)
@@ -248,22 +294,22 @@ def test_a_project_whose_lens_is_gone_is_told_without_a_command(tmp_path):
         session.open(str(tmp_path / "shot.toml"))
     with pytest.raises(FlarewrightError, match="of the panel Library; a dropped file comes alone"):
         take_in(session, "shot.toml", text.encode())
-    # nor do its pictures come with it: a project without them would show none
+    # its pictures do not come with it: the project would render without them
     before = session.project
     for more in ('[iris]\nmask = "m.png"', '[dirt]\nimage = "m.png"', '[holdout]\nimage = "m.png"'):
         with pytest.raises(FlarewrightError, match=r"^shot\.toml: m\.png does not exist; a dropped file comes alone"):
             take_in(session, "shot.toml", text.replace("my-lens.toml", "tessar-brendel").encode() + more.encode())
     assert session.project is before
-    session.keeper.close()
+    session.writer.close()
 
 
 def test_without_a_name_the_last_file_is_opened_again(tmp_path):
     session, _ = begin(None)
     session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
     path = session.save(str(tmp_path / "shot.toml"))
-    session.keeper.close()
+    session.writer.close()
     again, _ = begin(None)
-    again.keeper.close()
+    again.writer.close()
     assert (again.file, again.project, again.history.undo_label) == (str(path), session.project, "Move the light")
     path.write_text(path.read_text().replace("f_number = 16.0", "f_number = 11.0"))
     changed, _ = begin(None)
@@ -272,7 +318,7 @@ def test_without_a_name_the_last_file_is_opened_again(tmp_path):
     assert changed.project.f_number == 16.0
 
 
-def test_a_refused_deed_leaves_everything_as_it_was(project):
+def test_a_rejected_command_changes_nothing(project):
     session, _ = begin(None)
     before = session.history
     for name, values in (
@@ -283,12 +329,12 @@ def test_a_refused_deed_leaves_everything_as_it_was(project):
         ("set_iris", {"values": {"rounding": 2.0}}),
         ("remove_light", {"light": 0}),
         ("set_coating", {"text": "gold"}),
-        ("no such deed", {}),
+        ("no such command", {}),
         ("move_light", {"light": 0}),
     ):
-        with pytest.raises(FlarewrightError) as told:
+        with pytest.raises(FlarewrightError) as reported:
             session.do(name, values)
-        assert "\n" not in str(told.value)
+        assert "\n" not in str(reported.value)
     assert session.history is before
     assert json.dumps(str(session.project))
 
@@ -306,42 +352,42 @@ def test_a_refused_deed_leaves_everything_as_it_was(project):
     ],
 )
 def test_what_is_refused_is_said_in_words(project, name, values, said):
-    with pytest.raises(FlarewrightError) as told:
+    with pytest.raises(FlarewrightError) as reported:
         done(project, name, values)
-    assert str(told.value).startswith(said)
+    assert str(reported.value).startswith(said)
 
 
 @pytest.mark.parametrize(
     ("name", "values", "said"),
     [
-        ("move_light", {"light": 0, "x": 100.0, "y": 3.0}, "100° right became 80°: a light goes out to 80° at most"),
-        ("move_light", {"light": 0, "x": 10.0, "y": -90.0}, "-90° up became -80°: a light goes out to 80° at most"),
+        ("move_light", {"light": 0, "x": 100.0, "y": 3.0}, "100° right became 80°: the largest angle of a light is"),
+        ("move_light", {"light": 0, "x": 10.0, "y": -90.0}, "-90° up became -80°: the largest angle of a light is"),
         ("move_light", {"light": 0, "x": 10.0, "y": 3.0}, ""),
         ("set_iris", {"values": {"blades": 2}}, "2 blades became a round opening: an iris has 3 blades at least"),
         ("set_iris", {"values": {"blades": 5}}, ""),
         ("set_iris", {"values": {"rounding": 0.5}}, ""),
         ("set_fields", {"values": {"f_number": 1}}, "f/1 became f/3.5: this lens opens no wider"),
         ("set_fields", {"values": {"f_number": 5.6}}, ""),
-        ("set_key", {"light": 0, "at_s": -1.0}, "-1 s became 0 s: a path begins there"),
-        ("set_key", {"light": 0, "at_s": 0.123}, "0.123 s became 0.12 s: keys stand at hundredths"),
+        ("set_key", {"light": 0, "at_s": -1.0}, "-1 s became 0 s: a path starts there"),
+        ("set_key", {"light": 0, "at_s": 0.123}, "0.123 s became 0.12 s: keys lie at hundredths"),
         ("set_key", {"light": 0, "at_s": 0.07}, ""),
     ],
 )
-def test_a_number_that_was_typed_and_corrected_is_told(name, values, said):
+def test_a_corrected_number_is_reported(name, values, said):
     session, _ = begin(None)
-    told = session.do(name, values)
-    assert told.startswith(said)
-    assert bool(told) == bool(said)
-    # a hand that slides sees what becomes of it
+    reported = session.do(name, values)
+    assert reported.startswith(said)
+    assert bool(reported) == bool(said)
+    # a slider shows the corrected value itself
     assert session.do(name, values, "stroke") == ""
-    session.keeper.close()
+    session.writer.close()
 
 
 def test_a_round_iris_gets_three_blades_where_one_is_typed():
     session, _ = begin(None)
     session.do("set_iris", {"values": {"blades": 0}})
     assert session.do("set_iris", {"values": {"blades": 1}}).startswith("1 blades became 3: an iris has 3 blades")
-    session.keeper.close()
+    session.writer.close()
 
 
 def test_lights_that_are_added_have_names_of_their_own(project):
@@ -351,31 +397,31 @@ def test_lights_that_are_added_have_names_of_their_own(project):
     assert [light.name for light in do(two, "add_light").lights] == ["light", "light 3", "light 4"]
 
 
-def test_a_deed_on_a_row_is_none_on_a_row_of_another_lens():
+def test_a_command_on_a_row_does_not_apply_to_another_lens():
     session, _ = begin(None)
     with pytest.raises(FlarewrightError, match=r"^exposure must be at most 60, not 1000$"):
         session.set_view({"exposure_stops": 1000})
     seen = table_of(session.project)
     session.do("set_cell", {"row": 1, "column": "thickness", "text": "4"}, table=seen)
-    # another cell is still that of this lens
+    # a cell unchanged in this lens
     session.do("set_cell", {"row": 0, "column": "radius", "text": "33"}, table=seen)
     for name, values in (("add_row", {"row": 1}), ("choose_lens", {"lens": "tessar-brendel"})):
         session.do(name, values)
         before = session.project
-        with pytest.raises(FlarewrightError, match="the lens has become another one"):
+        with pytest.raises(FlarewrightError, match="the lens has changed since"):
             session.do("set_cell", {"row": 0, "column": "radius", "text": "44"}, table=seen)
         assert session.project is before
-    session.keeper.close()
+    session.writer.close()
 
 
-def test_every_deed_is_tried_here():
+def test_every_command_is_tried_here():
     tried = (
         "move_light set_light add_light remove_light set_camera set_quality set_fields set_iris set_dirt set_starburst "
         "set_pass_gain set_coating put_look set_row_wavelengths set_cell add_row duplicate_row remove_row move_stop "
-        "choose_lens set_lens_facts set_ghost set_solo reset_art set_wish add_ghost remove_wish set_new_wish "
-        "set_design clear_wishes set_key move_key remove_key clear_keys go_to set_holdout"
+        "choose_lens set_lens_facts set_ghost set_solo reset_art set_ghost_target add_ghost remove_ghost_target "
+        "set_new_ghost_target set_design clear_ghost_targets set_key move_key remove_key clear_keys go_to set_holdout"
     )
-    assert sorted(tried.split()) == sorted(DEEDS)
+    assert sorted(tried.split()) == sorted(COMMANDS)
 
 
 def test_lights_camera_iris_and_coating(project):
@@ -404,8 +450,8 @@ def test_lights_camera_iris_and_coating(project):
     mapped = do(project, "set_row_wavelengths", values={"0": 500.0, "4": 600.0})
     assert isinstance(mapped.coating, PerRow)
     assert mapped.coating.coatings[4] == QuarterWave(center_wavelength_nm=600.0)
-    # the others keep what the preset gives them
-    assert mapped.coating.coatings[1] == as_lens("heliar-tronnier").coating_presets["thesis"][1]
+    # the others keep the preset's coatings
+    assert mapped.coating.coatings[1] == open_lens("heliar-tronnier").lens.coating_presets["thesis"][1]
 
 
 def test_cells_change_the_lens_and_say_what_is_odd(project):
@@ -433,7 +479,7 @@ def test_cells_change_the_lens_and_say_what_is_odd(project):
 def test_an_image_distance_that_is_not_used_says_so(project):
     last = len(own_lens(project).rows) - 1
     changed = prescription(do(project, "set_cell", row=last, column="thickness", text="60"))
-    assert "not used: the sensor stands where" in changed.rows[last]["notes"]["thickness"]
+    assert "without effect: the sensor is at" in changed.rows[last]["notes"]["thickness"]
     place = changed.facts["sensor_distance"]
     kept = prescription(do(project, "set_cell", row=last, column="thickness", text=f"{place:.2f}"))
     assert "thickness" not in kept.rows[last]["notes"]
@@ -441,14 +487,14 @@ def test_an_image_distance_that_is_not_used_says_so(project):
 
 def test_facts_of_the_table_are_those_of_the_lens(project):
     table = prescription(project)
-    order = first_order(as_lens("heliar-tronnier"), 8.0)
+    order = first_order(open_lens("heliar-tronnier").lens, 8.0)
     assert table.facts["efl"] == order.efl
     assert table.facts["bfl"] == order.bfl
     assert [row["stop"] for row in table.rows].index(True) == 5
     assert table.problem == ""
 
 
-def test_a_lens_without_an_image_tells_why_and_keeps_its_table(project):
+def test_a_lens_without_an_image_has_a_reason_and_keeps_its_table(project):
     flat = project
     for row in (0, 1, 2, 3, 4, 7, 8):
         flat = do(flat, "set_cell", row=row, column="radius", text="flat")
@@ -456,25 +502,25 @@ def test_a_lens_without_an_image_tells_why_and_keeps_its_table(project):
     assert table.facts == {}
     assert table.problem
     assert table.rows[0]["radius"] == "flat"
-    # and it can be mended from there
+    # it can be repaired from there
     assert prescription(do(flat, "set_cell", row=0, column="radius", text="30.81")).problem == ""
 
 
 def test_rows_come_and_go_with_everything_that_counts_them(project):
-    lens = as_lens(project.lens)
+    lens = open_lens(project.lens).lens
     muted = do(project, "set_ghost", name="4-1", values={"muted": True})
     longer = do(muted, "add_row", row=2)
     assert len(longer.lens.rows) == len(lens.rows) + 1
     assert longer.lens.stop_row == 6
     assert longer.lens.rows[2].thickness + longer.lens.rows[3].thickness == pytest.approx(lens.rows[2].thickness)
     assert longer.lens.coating_presets["thesis"][4] == lens.coating_presets["thesis"][3]
-    # ghosts have other names now
+    # the ghosts have other names now
     assert longer.art.rules == ()
     shorter = do(longer, "remove_row", row=3)
     assert [row.curvature for row in own_lens(shorter).rows if not isinstance(row, Stop)] == [
         row.curvature for row in lens.rows if not isinstance(row, Stop)
     ]
-    assert first_order(as_lens(shorter.lens)).efl == pytest.approx(first_order(lens).efl, rel=1e-12)
+    assert first_order(open_lens(shorter.lens).lens).efl == pytest.approx(first_order(lens).efl, rel=1e-12)
     assert len(do(project, "duplicate_row", row=1).lens.rows) == len(lens.rows) + 1
     assert do(project, "set_lens_facts", values={"name": "Mine"}).lens.name == "Mine"
 
@@ -486,7 +532,7 @@ def test_rows_come_and_go_with_everything_that_counts_them(project):
 )  # fmt: skip
 def test_the_stop_moves_and_the_lens_stays_as_sharp(name, every):
     project = begin(name)[0].project
-    lens = as_lens(name)
+    lens = open_lens(name).lens
     refused, moved = [], 0
     for row, one in enumerate(lens.rows):
         if isinstance(one, Stop) or row % every:
@@ -497,13 +543,13 @@ def test_the_stop_moves_and_the_lens_stays_as_sharp(name, every):
             refused.append(str(error))
             continue
         moved += 1
-        now = as_lens(found.lens)
+        now = open_lens(found.lens).lens
         assert now.stop_row != lens.stop_row
         assert [r.curvature for r in now.rows if isinstance(r, Surface)] == [
             r.curvature for r in lens.rows if isinstance(r, Surface)
         ]
         for position in (None, *(each.name for each in lens.positions)):
-            before, after = (settle(each.replace(zoom=position)).order for each in (project, found))
+            before, after = (resolve_project(each.replace(zoom=position)).order for each in (project, found))
             assert after.efl == pytest.approx(before.efl, rel=1e-9)
             assert after.bfl == pytest.approx(before.bfl, rel=1e-9)
     assert moved >= 2
@@ -512,7 +558,7 @@ def test_the_stop_moves_and_the_lens_stays_as_sharp(name, every):
 
 def test_zoom_gaps_keep_their_surfaces():
     zoom = done(begin("canon-70-200")[0].project, "add_row", {"row": 0})[0]
-    before = as_lens("canon-70-200")
+    before = open_lens("canon-70-200").lens
     assert {row + 1 for row, _ in before.positions[0].gaps} == {row for row, _ in zoom.lens.positions[0].gaps}
 
 
@@ -520,17 +566,19 @@ def test_another_lens_keeps_the_light_where_it_was_in_the_picture(project):
     from math import radians, tan
 
     other = do(project, "choose_lens", lens="biotar-50-f1.4")
-    place = [first_order(as_lens(one.lens)).efl * tan(radians(one.lights[0].field_deg[0])) for one in (project, other)]
+    place = [
+        first_order(open_lens(one.lens).lens).efl * tan(radians(one.lights[0].field_deg[0])) for one in (project, other)
+    ]
     assert place[1] == pytest.approx(place[0], rel=1e-4)
     assert other.f_number == 8.0
 
 
 def test_mute_solo_gain_and_tint_are_rules_that_can_be_taken_back(project):
     loud = do(project, "set_ghost", name="4-1", values={"gain": 3.0, "tint": [1.0, 0.5, 0.25]})
-    assert hand(loud.art, "4-1") == Hand(False, 3.0, (1.0, 0.5, 0.25))
+    assert override_of(loud.art, "4-1") == GhostOverride(False, 3.0, (1.0, 0.5, 0.25))
     alone = do(loud, "set_solo", names=["4-1", "8-6"])
     assert soloed(alone.art) == ("4-1", "8-6")
-    # muting a soloed ghost still lets the solo have the last word about the others
+    # muting a soloed ghost: the solo still decides about the others
     muted = do(alone, "set_ghost", name="8-6", values={"muted": True})
     assert soloed(muted.art) == ("4-1", "8-6")
     assert do(alone, "set_solo", names=[]) == loud
@@ -543,17 +591,17 @@ def test_from_scratch_needs_a_ghost_that_was_added(project):
         do(project, "set_design", values={"own_ghosts": False, "structure": "any"})
     added = do(do(project, "add_ghost", place_mm=5.0, radius_mm=1.0), "set_design", values={"own_ghosts": False})
     assert added.design.own_ghosts is False
-    # the last of them can be taken back all the same
-    assert do(added, "remove_wish", number=0).design.own_ghosts is True
+    # the last added ghost can be removed all the same
+    assert do(added, "remove_ghost_target", number=0).design.own_ghosts is True
 
 
 def without_the_last(session):
-    """Take the only new ghost back as the page does; return the structure that is left."""
+    """Remove the only new ghost as the page does; return the structure afterwards."""
     design = session.project.design
     before = past.design_before_added(session.history) or past.design_before_scratch(session.history)
     kept = None if before is None else {"structure": before.structure, "fixed_rows": before.fixed_rows}
-    number = next(k for k, wish in enumerate(design.wishes) if wish.ghost is None)
-    session.do("remove_wish", {"number": number, "before": kept})
+    number = next(k for k, ghost_target in enumerate(design.ghost_targets) if ghost_target.ghost is None)
+    session.do("remove_ghost_target", {"number": number, "before": kept})
     return session.project.design.structure
 
 
@@ -565,25 +613,25 @@ def test_what_a_new_ghost_needed_goes_with_the_last_one(project):
     def search(**values):
         session.do("set_design", {"values": values})
 
-    # as the page shows where nothing is wished
+    # as the page shows without targets
     session.do(*add)
     assert session.project.design.structure == "any"
     assert without_the_last(session) == "lens"
-    # and as a person had it, with what was to stay
-    session.do("set_wish", {"ghost": "4-1", "values": {"move_mm": 2.0}})
+    # and with the user's own settings, which must stay
+    session.do("set_ghost_target", {"ghost": "4-1", "values": {"move_mm": 2.0}})
     search(fixed_rows=(0, 1))
     session.do(*add)
     session.do(*add)
-    session.do("set_new_wish", {"number": 2, "values": {"radius_mm": 2.0}})
-    session.do("remove_wish", {"number": 1, "before": None})
+    session.do("set_new_ghost_target", {"number": 2, "values": {"radius_mm": 2.0}})
+    session.do("remove_ghost_target", {"number": 1, "before": None})
     assert session.project.design.structure == "any"
     assert without_the_last(session) == "lens"
     assert session.project.design.fixed_rows == (0, 1)
-    # any structure was wanted before
+    # any structure was chosen before
     search(structure="any")
     session.do(*add)
     assert without_the_last(session) == "any"
-    # or was chosen since, by itself or with a count of surfaces
+    # or chosen since, directly or by a number of surfaces
     search(structure="lens")
     session.do(*add)
     search(structure="lens")
@@ -593,7 +641,7 @@ def test_what_a_new_ghost_needed_goes_with_the_last_one(project):
     session.do(*add)
     search(surfaces=12, structure="any")
     assert without_the_last(session) == "any"
-    # from scratch asked for it only as long as there was a ghost to aim at
+    # from scratch set it, for as long as there was an added ghost
     search(surfaces=None, structure="lens")
     session.do(*add)
     search(own_ghosts=False, structure="any")
@@ -602,37 +650,40 @@ def test_what_a_new_ghost_needed_goes_with_the_last_one(project):
     search(structure="lens")
     search(own_ghosts=False, structure="any")
     assert without_the_last(session) == "lens"
-    # nobody knows what was before a file that has such a ghost
+    # the state before is unknown for a file with such a ghost
     session.put(do(project, *add[:1], **add[1]), "Open", begins=True)
     assert past.design_before_added(session.history) is None
     assert without_the_last(session) == "any"
-    session.keeper.close()
+    session.writer.close()
 
 
-def test_wishes_make_the_target(project):
-    wished = do(project, "set_wish", ghost="4-1", values={"move_mm": 2.0, "height": 0.5})
-    wished = do(wished, "set_wish", ghost="8-6", values={"action": "remove"})
-    assert wished.design.structure == "lens"
-    target = target_project(wished)
+def test_targets_make_the_target_picture(project):
+    wanted = do(project, "set_ghost_target", ghost="4-1", values={"move_mm": 2.0, "height": 0.5})
+    wanted = do(wanted, "set_ghost_target", ghost="8-6", values={"action": "remove"})
+    assert wanted.design.structure == "lens"
+    target = target_project(wanted)
     moved, gone = target.art.rules
     x, y = direction(project)
     assert moved.offset_mm == pytest.approx((2.0 * x, 2.0 * y))
     assert moved.scale == 0.5
     assert gone.enable is False
-    new = do(wished, "add_ghost", place_mm=5.0, radius_mm=1.0)
+    new = do(wanted, "add_ghost", place_mm=5.0, radius_mm=1.0)
     assert new.design.structure == "any"
     assert new_discs(new) == (pytest.approx((5.0 * x, 5.0 * y, 1.0)),)
-    assert do(new, "set_new_wish", number=2, values={"radius_mm": 2.0}).design.wishes[2].radius_mm == 2.0
-    assert len(do(new, "remove_wish", number=0).design.wishes) == 2
+    assert do(new, "set_new_ghost_target", number=2, values={"radius_mm": 2.0}).design.ghost_targets[2].radius_mm == 2.0
+    assert len(do(new, "remove_ghost_target", number=0).design.ghost_targets) == 2
     assert do(new, "set_design", values={"structure": "any"}).design.structure == "any"
-    # one that is changed keeps its place in the list
-    again = do(new, "set_wish", ghost="4-1", values={"move_mm": 3.0})
-    assert [wish.ghost for wish in again.design.wishes] == ["4-1", "8-6", None]
-    assert do(again, "set_wish", ghost="4-1", values={"move_mm": 0.0, "height": 1.0}).design.wishes[0].ghost == "8-6"
-    assert wish_names(again.design) == ("ghost 4-1", "ghost 8-6", "added ghost 1")
-    assert do(new, "clear_wishes").design is None
+    # a changed target keeps its position in the list
+    again = do(new, "set_ghost_target", ghost="4-1", values={"move_mm": 3.0})
+    assert [ghost_target.ghost for ghost_target in again.design.ghost_targets] == ["4-1", "8-6", None]
+    assert (
+        do(again, "set_ghost_target", ghost="4-1", values={"move_mm": 0.0, "height": 1.0}).design.ghost_targets[0].ghost
+        == "8-6"
+    )
+    assert ghost_target_names(again.design) == ("ghost 4-1", "ghost 8-6", "added ghost 1")
+    assert do(new, "clear_ghost_targets").design is None
     with pytest.raises(FlarewrightError, match="crosses the stop"):
-        do(project, "set_wish", ghost="8-0", values={"move_mm": 1.0})
+        do(project, "set_ghost_target", ghost="8-0", values={"move_mm": 1.0})
 
 
 def test_a_lane_does_the_newest_and_drops_the_rest():
@@ -670,35 +721,6 @@ def test_a_lane_outlives_a_job_that_fails(capsys):
     lane.close()
 
 
-def test_a_lens_named_on_the_command_line_has_an_autosave_of_its_own():
+def test_a_lens_named_on_the_command_line_has_a_separate_autosave():
     assert autosave_path(None) != autosave_path("tessar-brendel")
     assert Light(field_deg=(0, 0)) is not None
-
-
-def test_a_gate_lets_the_newest_through_first():
-    gate, order = Gate(), []
-    held, waiting = threading.Event(), threading.Semaphore(0)
-
-    def go(name):
-        waiting.release()
-        with gate:
-            order.append(name)
-
-    def hold():
-        with gate:
-            waiting.release()
-            held.wait(10.0)
-
-    threads = [threading.Thread(target=hold)]
-    threads[0].start()
-    waiting.acquire(timeout=10.0)
-    for name in "abc":
-        threads.append(threading.Thread(target=go, args=(name,)))
-        threads[-1].start()
-        waiting.acquire(timeout=10.0)
-        while len(gate._waiting) < len(threads) - 1:
-            pass
-    held.set()
-    for thread in threads:
-        thread.join(10.0)
-    assert order == ["c", "b", "a"]

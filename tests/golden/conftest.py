@@ -1,7 +1,7 @@
-"""Two flags that replace the golden layers, one of them the reason.
+"""Flags that replace the golden layers; a replacement needs a reason.
 
-`pytest tests/golden --update-golden --reason "why the pictures changed"` (the folder must be named, or pytest reads
-this file too late to know its flags).
+`pytest tests/golden --update-golden --reason "why the pictures changed"` (name the folder, or pytest reads this file
+too late to know the flags).
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture(scope="session")
 def updating(request: pytest.FixtureRequest) -> bool:
-    """Tell whether the layers are to be replaced; keeps the reason, refuses without one."""
-    # the flags are unknown when the whole suite runs
+    """Return whether to replace the layers, and record the reason; raise an error without one."""
+    # the flags are not registered when the whole suite runs
     if not request.config.getoption("--update-golden", default=False):
         return False
     reason = " ".join(request.config.getoption("--reason").split())

@@ -1,10 +1,9 @@
-"""Golden layers: what three lenses looked like when the pictures were last judged by eye and by the physics tests.
+"""Golden layers: pictures of three lenses from the last time they were checked by eye and by the physics tests.
 
-They say that a picture changed, not that it is right. What may differ between machines is rounding: the compiler
-orders sums its own way and fuses or does not fuse multiply and add, which moves a ray by 1e-12 mm and a pixel by the
-last bits of a 32-bit sum. Where that rounding flips a decision of the adaptive grid, a few pixels along an edge may
-move by more; so pixels are compared twice: nearly all of them to 1e-4 of the layer's brightest, and the mean error to
-1e-6 of it.
+They detect that a picture changed, not that it is correct. Rounding may differ between machines: the compiler orders
+sums and fuses multiply and add differently, which moves a ray by 1e-12 mm and changes the last bits of a pixel. Where
+that rounding flips a decision of the adaptive grid, a few pixels along an edge can change by more. So pixels are
+compared twice: nearly all of them to 1e-4 of the layer's maximum, and the mean error to 1e-6 of it.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flarewright.io.exr import read_exr, write_exr
+from flarewright.io.images.exr import read_exr, write_exr
 from flarewright.model import Camera, Iris, Light, Output, Preset, Project, Quality
 from flarewright.render.render import Rendering, render
 
@@ -42,7 +41,7 @@ def scene(lens: str, mode: str) -> Project:
         lights=(Light(field_deg=FIELDS[lens]),),
         camera=Camera(size_px=SIZE, sensor_mm=SENSORS[lens]),
         quality=Quality(mode=mode, wavelengths=3 if mode == "draft" else 5, paths=PATHS[lens], ringing="off"),
-        # the starburst is the same in both, once is enough
+        # both qualities have the same starburst, so one test of it is enough
         output=Output(layers="ghosts", brightest=BRIGHTEST, starburst=mode == "final"),
         **SCENES[lens],
     )
@@ -56,7 +55,7 @@ def over_picture(layer) -> np.ndarray:
 
 
 def write(result: Rendering, path: Path) -> None:
-    """Write all but the beauty, which is their sum; each layer cropped to its light."""
+    """Write all layers but the beauty, which is their sum; each layer cropped to its light."""
     kept = [layer for layer in result.layers if layer.name != "beauty"]
     about = {"scene": path.stem, "fields": str(FIELDS[path.stem.rsplit(".", 1)[0]])}
     write_exr(path, kept, size_px=SIZE, pixel_type="float", metadata=about)
@@ -100,7 +99,7 @@ def test_the_goldens_are_small():
 
 
 def test_a_change_is_noticed():
-    """A hundredth of a stop, a shift by a pixel, a lost layer's worth of light."""
+    """The comparison detects a hundredth of a stop, a shift by a pixel, and a missing layer."""
     golden = over_picture(next(x for x in read_exr(FOLDER / "heliar-tronnier.final.exr").layers if x.name == "ghosts"))
     assert differences("same", golden, golden) == []
     assert differences("rounded", golden.astype(np.float32) * np.float32(1 + 1e-7), golden) == []

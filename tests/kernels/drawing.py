@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from flarewright.kernels import raster
-from flarewright.kernels._jit import for_python
-from flarewright.kernels.raster import blank_plane, to_pixels
+from flarewright.kernels.jit.decorators import for_python
+from flarewright.kernels.raster import polygons
+from flarewright.kernels.raster.polygons import blank_plane, to_pixels
 
-fill_polygon = for_python(raster.fill_polygon)
+fill_polygon = for_python(polygons.fill_polygon)
 
 WHITE = np.ones(3)
 
 
 def blank(width: int, height: int) -> np.ndarray:
-    """A black picture."""
+    """Return a black picture."""
     return blank_plane(width, height)
 
 
 def channels(plane: np.ndarray, width: int) -> np.ndarray:
-    """The picture channel by channel, shape (3, H, W)."""
+    """Return the channels of a picture, shape (3, H, W)."""
     return np.moveaxis(to_pixels(plane, width), 2, 0)
 
 

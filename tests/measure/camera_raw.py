@@ -1,19 +1,19 @@
-"""A minimal camera RAW file: an uncompressed DNG with a Bayer mosaic, as a real decoder reads it."""
+"""Writer of a minimal camera RAW file: an uncompressed DNG with a Bayer mosaic that a real decoder reads."""
 
 from pathlib import Path
 
 import numpy as np
 import tifffile
 
-from flarewright.optics.color import xyz_to_rgb_matrix
+from flarewright.optics.colour.rgb import xyz_to_rgb_matrix
 
 BLACK, WHITE = 512, 16383
-# XYZ to the camera's colours, in ten-thousandths as such files hold them
+# matrix from XYZ to the camera's colours, in ten-thousandths as in DNG files
 COLOR_MATRIX = ((7000, -900, -1000), (-4500, 12500, 2200), (-800, 1900, 5800))
 
 
 def camera_to_rec709() -> np.ndarray:
-    """Return what the matrix means: the camera's D65 white with a green of 1 is white."""
+    """Return the matrix from camera colours to Rec. 709; D65 white has a green of 1."""
     matrix = np.array(COLOR_MATRIX) / 1e4
     white = matrix @ [0.95047, 1.0, 1.08883]
     return xyz_to_rgb_matrix("rec709") @ np.linalg.inv(matrix) * white[1]

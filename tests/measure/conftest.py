@@ -1,4 +1,4 @@
-"""One run of the synthetic camera, merged once for all tests of this folder."""
+"""Fixtures: one run of the synthetic camera, merged once for all tests of this folder."""
 
 import json
 from collections.abc import Iterator
@@ -9,8 +9,8 @@ from measured_run import SETUP, Measured, Staged
 from planted_run import LARGEST, write_small
 from synthetic_camera import make
 
-from flarewright.io.captures import read_camera, read_captures
-from flarewright.measure.merge_run import merge_captures
+from flarewright.io.measurement.captures import read_camera, read_captures
+from flarewright.measure.pipeline.merge_stage import merge_captures
 
 
 @pytest.fixture(scope="session")
@@ -24,10 +24,11 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Measured:
 
 @pytest.fixture(scope="session")
 def staged(tmp_path_factory: pytest.TempPathFactory) -> Staged:
-    """Return a small run with all its stages: copy the folder before anything in it changes."""
-    from flarewright.cli.measure_stages import STAGES, run_stages
-    from flarewright.measure import pursuit
-    from flarewright.measure.journal import Journal
+    """Return a small run with all its stages; a test must copy the folder before it changes files."""
+    from flarewright.measure.core.checkpoint import Journal
+    from flarewright.measure.detection import matching_pursuit
+    from flarewright.workflow.measure_provenance import STAGES
+    from flarewright.workflow.measure_run import run_stages
 
     folder, steps, facts = tmp_path_factory.mktemp("staged"), {}, {}
     write_small(folder, angles=np.linspace(2.0, LARGEST, 4))
@@ -38,20 +39,20 @@ def staged(tmp_path_factory: pytest.TempPathFactory) -> Staged:
         return real(self, make)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pursuit, "_lunes", lambda *_: [])
+        patch.setattr(matching_pursuit, "_crescents", lambda *_: [])
         patch.setattr(Journal, "step", counted)
         for stage in STAGES:
-            # what is left beside the ghosts is learned by the last one
-            facts |= run_stages(folder, [stage], 1, None, None, False, residual=stage == STAGES[-1])
+            # only the last stage fits the residual
+            facts |= {each.stage: each for each in run_stages(folder, [stage], residual=stage == STAGES[-1])}
             steps[stage] = len(done) - sum(steps.values())
     return Staged(folder, facts, steps)
 
 
 @pytest.fixture(scope="module")
-def no_lunes() -> Iterator[None]:
-    """Leave out the dearest part of a search where none of what was planted is one (`test_lunes`)."""
-    from flarewright.measure import pursuit
+def no_crescents() -> Iterator[None]:
+    """Skip the crescent search, the most expensive part, for runs without crescents (`test_crescents` tests it)."""
+    from flarewright.measure.detection import matching_pursuit
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pursuit, "_lunes", lambda *_: [])
+        patch.setattr(matching_pursuit, "_crescents", lambda *_: [])
         yield

@@ -1,4 +1,4 @@
-"""The runs that several tests look at: how they are made, and what there is of them."""
+"""Runs that several tests share."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Any
 
 from synthetic_camera import Setup
 
-from flarewright.model.capture import MergedRun
+from flarewright.model.measurement.capture import MergedRun
 
 SETUP = Setup(
     size_px=(240, 160), angles_deg=tuple(3.6 * k for k in range(-1, 5)), pitch_deg=0.3, axis_offset_px=(2, -1),
@@ -16,7 +16,7 @@ SETUP = Setup(
 
 @dataclass(frozen=True)
 class Measured:
-    """Photographs, what they were made from, and what merging made of them."""
+    """Folders of photographs and of the merged run, the truth, and the run."""
 
     photographs: Path
     folder: Path
@@ -26,7 +26,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Staged:
-    """The folder of a run with all its stages, what these reported, and how many steps each had."""
+    """Folder of a run with all its stages, their reports, and the number of steps of each."""
 
     folder: Path
     facts: dict[str, Any]

@@ -1,4 +1,4 @@
-"""Captures of ghosts that are known number by number: no lens, no renderer, only the primitive and noise."""
+"""Captures of ghosts with known parameters, from the ghost model and noise, without a lens or renderer."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from pathlib import Path
 
 import numpy as np
 
-from flarewright.io.merged import write_frame, write_run
-from flarewright.measure.fit import render
-from flarewright.measure.found import Found
-from flarewright.measure.numbers import NUMBERS, field, frame
-from flarewright.measure.settle import to_model
-from flarewright.measure.shape import Shape, enlarged
-from flarewright.measure.views import View
-from flarewright.model.capture import FrameInfo, MergedFrame, MergedRun
-from flarewright.model.ghost_model import GhostModel
+from flarewright.io.measurement.merged import write_frame, write_run
+from flarewright.measure.core.parameter_vector import NUMBERS, field, frame
+from flarewright.measure.core.parameters import Shape, rescaled
+from flarewright.measure.core.views import View
+from flarewright.measure.fitting.alternating_fit import to_model
+from flarewright.measure.fitting.detected_ghost import DetectedGhost
+from flarewright.measure.fitting.ghost_fit import render
+from flarewright.model.measurement.capture import FrameInfo, MergedFrame, MergedRun
+from flarewright.model.measurement.ghost_model import GhostModel
 
 SIZE = (240, 160)
 LARGEST = 24.0
 NOISE = 0.01
-# of a merged run: constellations, and pixels per radian
+# constellations and pixels per radian of a merged run
 ANGLES = np.linspace(2.0, LARGEST, 12)
 FOCAL = 900.0
 
@@ -30,7 +30,7 @@ FOCAL = 900.0
 def shape(
     speed: float, size: float, level: float, *, bend: float = 0.0, rim: tuple[float, float] | None = None
 ) -> Shape:
-    """Return a ghost of a mean radiance `level`, with a little of every first-order aberration."""
+    """Return a ghost of mean radiance `level` with small values of every first-order aberration."""
     numbers = np.zeros(NUMBERS)
     numbers[:4] = speed, 0.02 * size, -0.05 * size, bend
     numbers[10:14] = size, 0.05 * size, 0.04 * size, -0.05 * size
@@ -47,21 +47,21 @@ GHOSTS = (
     shape(90.0, 7.0, 1.5, bend=-5.0),
 )
 
-# the same in pictures of half the size, for what goes through several stages
+# the same in pictures of half the size, for tests of several stages
 SMALL = (120, 80)
-SMALL_GHOSTS = tuple(enlarged(one, 0.5) for one in GHOSTS)
+SMALL_GHOSTS = tuple(rescaled(one, 0.5) for one in GHOSTS)
 SMALL_ANGLES = np.linspace(2.0, LARGEST, 5)
 
 
 @cache
 def _grain(seed: int, shape: tuple[int, ...]) -> tuple[Iterator[np.ndarray], list[np.ndarray]]:
-    """Return pictures of noise of 1, one after the other, and those that were drawn so far."""
+    """Return a generator of unit noise and the list of pictures drawn so far."""
     rng = np.random.default_rng(seed)
     return (rng.standard_normal(shape) for _ in count()), []
 
 
 def _noise(seed: int, number: int, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the noise of one picture: all runs of a seed and a size have the same, drawn once."""
+    """Return the noise of one picture, drawn once for all runs of a seed and a size."""
     fresh, drawn = _grain(seed, shape)
     while len(drawn) <= number:
         drawn.append(next(fresh))
@@ -69,7 +69,7 @@ def _noise(seed: int, number: int, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def views(ghosts=GHOSTS, *, angles=None, roll_deg=0.0, noise=NOISE, seed=0, size=SIZE) -> list[View]:
-    """Return noisy views of ghosts; all three colours alike."""
+    """Return noisy views of ghosts with equal colours."""
     out: list[View] = []
     for angle in np.linspace(1.0, LARGEST, 24) if angles is None else angles:
         placed = frame((0.5 * size[0] + 2.3, 0.5 * size[1] - 1.6), roll_deg, angle, 1.0)
@@ -92,7 +92,7 @@ def write(
     roll_deg=0.0,
     seed=0,
 ) -> MergedRun:
-    """Write a merged run of planted ghosts, the last of which is born at one of the constellations."""
+    """Write a merged run of planted ghosts; the last one appears at constellation number `last_from`."""
     (folder / "frames").mkdir(parents=True)
     born = views(ghosts, angles=angles, size=size, roll_deg=roll_deg, seed=seed)
     before = views(ghosts[:-1], angles=angles, size=size, roll_deg=roll_deg, seed=seed) if last_from else []
@@ -112,15 +112,15 @@ def write(
     return run
 
 
-def write_small(folder: Path, ghosts: Sequence[Shape] = SMALL_GHOSTS[:1], **told) -> MergedRun:
+def write_small(folder: Path, ghosts: Sequence[Shape] = SMALL_GHOSTS[:1], **reported) -> MergedRun:
     """Write a merged run of few small pictures."""
-    return write(folder, ghosts, **{"angles": SMALL_ANGLES, "size": SMALL, **told})
+    return write(folder, ghosts, **{"angles": SMALL_ANGLES, "size": SMALL, **reported})
 
 
 def rough_model(run: MergedRun, ghosts: Sequence[Shape] = SMALL_GHOSTS[:1]) -> GhostModel:
-    """Return the ghosts of a run as a search finds them at best."""
+    """Return the planted ghosts as a rough model, like an ideal result of the search."""
     angles = [frame.constellation_deg for frame in run.frames]
-    found = [Found((one, one, one), 0, len(angles) - 1) for one in ghosts]
+    found = [DetectedGhost((one, one, one), 0, len(angles) - 1) for one in ghosts]
     return GhostModel(
         size_px=run.size_px, axis_px=run.axis_px, focal_px=run.px_per_rad, largest_deg=max(angles),
         constellation_deg=(min(angles), max(angles)),

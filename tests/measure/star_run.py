@@ -1,4 +1,4 @@
-"""Photographs of a light that moves across a small picture: quick to make, without ghosts."""
+"""Photographs of a light that moves across a small picture, without ghosts; quick to make."""
 
 from functools import lru_cache
 from pathlib import Path
@@ -13,13 +13,13 @@ ANGLES = tuple(float(k) for k in range(6))
 
 
 def light_px(angle: float) -> tuple[float, float]:
-    """Return where the light stands: a path of 400 pixels per radian, a little tilted."""
+    """Return the position of the light on a slightly tilted path of 400 pixels per radian."""
     t = np.tan(np.radians(angle))
     return 40.3 + 400.0 * t, 31.6 - 4.0 * t
 
 
 def star(*places: tuple[float, float], level: float = 0.05) -> np.ndarray:
-    """Return radiance of stars over an even veil."""
+    """Return the radiance of stars over a uniform veil."""
     x, y = np.arange(96) + 0.5, np.arange(64)[:, None] + 0.5
     light = np.full((64, 96), level)
     for place in places:
@@ -30,7 +30,7 @@ def star(*places: tuple[float, float], level: float = 0.05) -> np.ndarray:
 
 @lru_cache(maxsize=200)
 def photographed(scene: bytes, time: float, seed: tuple[int, ...]) -> np.ndarray:
-    """Photograph a scene, once for all tests that show the same one."""
+    """Photograph a scene, once for all tests that use it."""
     return expose(CAMERA, np.frombuffer(scene, np.float32).reshape(64, 96, 3), time, 1.0, seed)
 
 
@@ -47,7 +47,7 @@ def shoot(folder: Path, scenes: dict[float, np.ndarray], times: tuple[float, ...
 
 
 def shoot_raw(folder: Path, scene: np.ndarray, name: str, time: float, seed: int) -> None:
-    """Write one DNG of twice the size: each photosite sees its own colour, with noise of its own."""
+    """Write one DNG of twice the size: each photosite has one colour and independent noise."""
     fine = np.repeat(np.repeat(scene, 2, axis=0), 2, axis=1)
     numbers = expose(CAMERA, fine, time, 1.0, (seed, 9))
     mosaic = numbers[..., 1].copy()

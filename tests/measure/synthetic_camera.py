@@ -1,8 +1,8 @@
-"""A camera that exists only in numbers: it photographs a light through a rendered lens while it turns.
+"""Simulated camera: it photographs a light source through a rendered lens while it turns.
 
-The turntable jitters, the camera wobbles and leans, the light drifts, the lens hazes, the sensor counts photons, reads
-with noise, digitises to 14 bits and clips. Beside the photographs stands the truth without noise. Everything follows
-from `Setup` and its seed. What was made is kept in the folder that FLAREWRIGHT_SYNTHETIC_CACHE names, if it is set.
+The simulation includes jitter of the turntable, wobble and tilt of the camera, drift of the light, haze of the lens,
+photon and read noise, 14-bit digitisation and clipping. It also writes the noise-free truth. The result depends only on
+`Setup` with its seed. The folder FLAREWRIGHT_SYNTHETIC_CACHE, if set, caches results.
 
     from synthetic_camera import Setup, make
     made = make(Setup(lens="tessar-brendel", angles_deg=(0, 2, 4)), folder)   # captures.csv, truth.json, *.npy
@@ -29,22 +29,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 import flarewright as fw
-from flarewright.model.capture import FrameInfo, MergedFrame
-from flarewright.optics.color import xyz_to_rgb_matrix
-from flarewright.render.direct import direct_image
-from flarewright.render.opening import make_opening
-from flarewright.render.prepare import settle
-from flarewright.render.shots import make_shots
+from flarewright.model.measurement.capture import FrameInfo, MergedFrame
+from flarewright.optics.colour.rgb import xyz_to_rgb_matrix
+from flarewright.render.scene.direct_image import direct_image
+from flarewright.render.scene.opening import make_opening
+from flarewright.render.scene.resolve import resolve_project
+from flarewright.render.scene.shots import make_shots
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.float32]
 
 VERSION = 3
-"""Raise when the same `Setup` gives other pixels, so that old caches are not taken."""
+"""Increase this number when the same `Setup` gives other pixels, which invalidates old caches."""
 
-# a direct image of less than this part of the brightest one's light tells no place
+# minimum light of a direct image, over that of the brightest one, to define the position of the light
 _SHOWN = 0.1
-# the sensor's red, green and blue from X, Y, Z: no weight is negative, so no light gives a negative count
+# the sensor's red, green and blue from X, Y, Z: all weights are at least 0, so that no count is negative
 _FROM_XYZ = np.array([[0.9, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.1, 0.85]])
 _FROM_REC709 = _FROM_XYZ @ np.linalg.inv(xyz_to_rgb_matrix("rec709"))
 
@@ -53,8 +53,9 @@ _FROM_REC709 = _FROM_XYZ @ np.linalg.inv(xyz_to_rgb_matrix("rec709"))
 class Setup:
     """Camera, light and turntable.
 
-    Angles of the turntable are those that the captures will tell; the true ones differ by jitter. Lengths on the sensor
-    are pixels. `bright` is where the brightest ghosts (99.5th percentile) lie in the longest exposure, as part of full.
+    The angles of the turntable are those listed with the captures; the true ones differ by jitter. Lengths on the
+    sensor are in pixels. `bright` is the level of the brightest ghosts (99.5th percentile) in the longest exposure, as
+    a fraction of full scale.
     """
 
     lens: str = "speed-panchro-50"
@@ -63,7 +64,7 @@ class Setup:
     sensor_width_mm: float = 36.0
     f_number: float | None = None
     blades: int | None = None
-    coating: str | None = "single-1950s"  # as the command line's --coating
+    coating: str | None = "single-1950s"  # a value of the option --coating
     zoom: float | None = None
     quality: str = "draft"
     wavelengths: int = 3
@@ -73,7 +74,7 @@ class Setup:
     iso: float = 100.0
     bright: float = 0.5
     light_diameter_deg: float = 0.2
-    haze: float = 0.05  # of the longest exposure's full, close to the light
+    haze: float = 0.05  # close to the light, over full scale of the longest exposure
     veil: float = 0.01
     haze_radius_px: float = 60.0
     black: float = 512.0
@@ -87,7 +88,7 @@ class Setup:
     pitch_wander_deg: float = 0.02
     drift: float = 0.02
     axis_offset_px: tuple[int, int] = (3, -2)
-    paths: tuple[str, ...] = ()  # ghosts of these alone, such as "7-3"; all when empty
+    paths: tuple[str, ...] = ()  # ghost paths to render, such as "7-3"; empty: all
     seed: int = 0
 
     @property
@@ -98,16 +99,13 @@ class Setup:
 
     @property
     def axis_px(self) -> tuple[float, float]:
-        """Where the optical axis meets the picture (x, y)."""
+        """Position of the optical axis (x, y)."""
         return 0.5 * self.size_px[0] + self.axis_offset_px[0], 0.5 * self.size_px[1] + self.axis_offset_px[1]
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Where the light truly stands at one step of the turntable.
-
-    `brightness` is the light's at each exposure.
-    """
+    """True position of the light at one step of the turntable, and its `brightness` at each exposure."""
 
     number: int
     nominal_deg: float
@@ -118,10 +116,10 @@ class Pose:
 
 @dataclass(frozen=True)
 class Truth:
-    """What a perfect camera would measure: linear, unit as in `MergedFrame` (1 fills the sensor in a second).
+    """Linear picture of a perfect camera, in the unit of `MergedFrame` (1 fills the sensor in a second).
 
-    The light's own image is at `image_px`: where rims let only its last rays pass these may land far from `light_px`,
-    where the lens' law has it.
+    `light_px` follows the projection of the lens; `image_px` is the direct image of the light. The two can differ much
+    where rims pass only the last rays.
     """
 
     total: Pixels
@@ -134,8 +132,8 @@ class Truth:
 class GhostTruth:
     """One ghost of one constellation.
 
-    `centre_px` is the middle of its outline, `outline_px` that outline in 64 directions from it; `flux` and `peak` are
-    per channel; `at_edge`: the picture cuts it.
+    `centre_px` is the centre of its outline, `outline_px` the outline in 64 directions from it. `flux` and `peak` are
+    per channel. `at_edge`: the picture's border cuts it.
     """
 
     name: str
@@ -147,7 +145,7 @@ class GhostTruth:
 
 
 def poses(setup: Setup) -> list[Pose]:
-    """Turn the table: jitter, lean, wander and drift from the seed."""
+    """Return the poses of all steps, with jitter, tilt, wander and drift from the seed."""
     rng = np.random.default_rng([setup.seed, 1])
     count, shots = len(setup.angles_deg), len(setup.exposures_s)
     jitter = rng.normal(size=count) * setup.jitter_deg
@@ -174,7 +172,7 @@ def _walk(rng: np.random.Generator, count: int) -> Floats:
 
 
 def project_of(setup: Setup, pose: Pose, layers: str) -> fw.Project:
-    """Return the light where it truly stands, with room for the axis' offset around the picture."""
+    """Return a project with the light at its true position and a margin for the offset of the axis."""
     (width, height), (right, down) = setup.size_px, setup.axis_offset_px
     big = (width + 2 * abs(right), height + 2 * abs(down))
     pixel = setup.sensor_width_mm / width
@@ -199,7 +197,7 @@ def render_pose(setup: Setup, pose: Pose, *, layers: str = "passes") -> fw.Rende
 
 
 def _coating(text: str) -> Any:
-    from flarewright.io.coating_text import parse_coating_choice
+    from flarewright.io.lens.coating_text import parse_coating_choice
 
     return parse_coating_choice(text)
 
@@ -216,24 +214,24 @@ def truth_of(setup: Setup, pose: Pose, scale: float) -> Truth:
 
 
 def light_places(setup: Setup, pose: Pose, rendering: fw.Rendering) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return where the light is, and where its image is, if it has any."""
-    told = rendering.summary["lights"][0]
+    """Return the position of the light, and that of its direct image, if it has one."""
+    reported = rendering.summary["lights"][0]
     _, _, most = _law(replace(setup.steady, roll_deg=0.0))
-    passed = max(told["direct_throughput_mm2"])
-    image = _on_picture(setup, told["direct_position_mm"])
+    passed = max(reported["direct_throughput_mm2"])
+    image = _on_picture(setup, reported["direct_position_mm"])
     # the last rays that rims let pass land anywhere
     light = image if passed > _SHOWN * most else _on_picture(setup, dark_mm(setup, pose))
     return light, image if passed > 0.0 else light
 
 
 def _on_picture(setup: Setup, place_mm: tuple[float, float]) -> tuple[float, float]:
-    """Return where a place on the sensor is in the picture, pixels."""
+    """Convert a position on the sensor, mm, to pixels of the picture."""
     per_mm = setup.size_px[0] / setup.sensor_width_mm
     return setup.axis_px[0] + place_mm[0] * per_mm, setup.axis_px[1] - place_mm[1] * per_mm
 
 
 def dark_mm(setup: Setup, pose: Pose) -> tuple[float, float]:
-    """Return where the light's image would be if the rims let it pass, on the sensor, mm: the lens' law goes on."""
+    """Return the position of the light on the sensor, mm, extrapolated by the projection of the lens."""
     focal, bent, _ = _law(replace(setup.steady, roll_deg=0.0))
     x, y = (np.tan(np.radians(angle)) for angle in pose.field_deg)
     stretch = focal * (1.0 + bent * (x * x + y * y))
@@ -242,10 +240,10 @@ def dark_mm(setup: Setup, pose: Pose) -> tuple[float, float]:
 
 @cache
 def _law(setup: Setup) -> tuple[float, float, float]:
-    """Return focal length (mm) and distortion by the direct images that are not dark, and the brightest's mm2."""
+    """Return focal length (mm) and distortion from the visible direct images, and the largest throughput (mm2)."""
     seen, most = [], 0.0
     for pose in poses(setup):
-        settled = settle(project_of(setup, pose, "passes"))
+        settled = resolve_project(project_of(setup, pose, "passes"))
         image = direct_image(settled.lens, make_shots(settled, make_opening(settled, None))[0])
         t = abs(float(np.tan(np.radians(pose.constellation_deg))))
         most = max(most, float(image.throughput_mm2.max()))
@@ -257,7 +255,7 @@ def _law(setup: Setup) -> tuple[float, float, float]:
 
 
 def _seen(setup: Setup, layer: fw.Layer) -> Floats:
-    """Crop a layer to the picture and turn it into the sensor's colours."""
+    """Crop a layer to the picture and convert it to the colours of the sensor."""
     (width, height), (right, down) = setup.size_px, setup.axis_offset_px
     big = np.zeros((height + 2 * abs(down), width + 2 * abs(right), 3))
     x, y, w, h = layer.window
@@ -267,7 +265,7 @@ def _seen(setup: Setup, layer: fw.Layer) -> Floats:
 
 
 def _blurred(image: Floats) -> Floats:
-    """Spread the direct image as a filter in front of the sensor does: a small kernel of unit sum."""
+    """Blur the direct image like a filter in front of the sensor, by a small kernel of unit sum."""
     kernel = np.exp(-0.5 * (np.arange(-3, 4) / 0.7) ** 2)
     return _along(_along(image, kernel / kernel.sum(), 0), kernel / kernel.sum(), 1)
 
@@ -290,7 +288,7 @@ def _haze(setup: Setup, light_px: tuple[float, float]) -> Floats:
 
 
 def scale_of(setup: Setup) -> float:
-    """Return radiance in the unit of `MergedFrame` over the renderer's, from the ghosts at the middle angle."""
+    """Return the unit of `MergedFrame` over that of the renderer, from the ghosts at the middle angle."""
     middle = replace(setup.steady, angles_deg=(setup.angles_deg[len(setup.angles_deg) // 2],))
     layer = {layer.name: layer for layer in render_pose(middle, poses(middle)[0]).layers}["ghosts"]
     level = float(np.percentile(_seen(setup, layer)[..., 1], 99.5))
@@ -298,11 +296,11 @@ def scale_of(setup: Setup) -> float:
 
 
 def expose(setup: Setup, radiance: Pixels, exposure_s: float, brightness: float, seed: tuple[int, ...]) -> NDArray[Any]:
-    """Photograph: photons, electrons that overflow, reading, digits."""
+    """Return the raw picture of an exposure, with photon noise, read noise, rounding and clipping."""
     rng = np.random.default_rng([setup.seed, 2, *seed])
     full = setup.white - setup.black
     units = radiance.astype(np.float64) * (exposure_s * brightness * full)
-    # what is clipped by far need not be counted exactly
+    # limit the electrons far above the clipping level
     electrons = rng.poisson(np.minimum(units, 4.0 * full) * setup.electrons_per_unit).astype(np.float64)
     electrons += rng.normal(size=electrons.shape) * setup.read_noise
     numbers = np.rint(setup.black + electrons / setup.electrons_per_unit)
@@ -353,9 +351,9 @@ def _ghost(name: str, image: Floats) -> GhostTruth | None:
     lit = green[green > 0.0]
     if lit.size == 0:
         return None
-    # half of what the even inside has: noise-free edges are sharp, so the level hardly matters
+    # half of the uniform level inside: noise-free edges are sharp, so the threshold hardly matters
     inside = green > 0.5 * float(np.median(lit))
-    # what is farthest in any direction lies on the border
+    # only border pixels can be the farthest in any direction
     padded = np.pad(inside, 1)
     surrounded = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
     rows, columns = np.nonzero(inside & ~surrounded)
@@ -373,7 +371,7 @@ def _ghost(name: str, image: Floats) -> GhostTruth | None:
 
 
 def make(setup: Setup, folder: Path | None = None, *, ghosts: bool = False) -> Path:
-    """Photograph everything into a folder, or find it in the cache.
+    """Photograph all captures into a folder, or copy them from the cache.
 
     Returns the folder: captures.csv, camera.json, `capture-KKK-J.npy` (uint16), `truth-KKK.npy` and `ghosts-KKK.npy`
     (float32), and truth.json: for each pose true angle, light_px, and with `ghosts` every ghost's centre, outline and

@@ -1,4 +1,4 @@
-"""Lists of captures: columns, rules, EXIF, and every mistake in a sentence."""
+"""Lists of captures: columns, rules, EXIF, and one sentence for every error."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,13 @@ from camera_raw import write_dng
 
 from flarewright.cli.app import run
 from flarewright.errors import FlarewrightError
-from flarewright.io.captures import AngleRule, parse_rule, read_camera, read_captures
+from flarewright.io.measurement.captures import (
+    AngleRule,
+    parse_rule,
+    read_camera,
+    read_capture_list,
+    read_captures,
+)  # fmt: skip
 
 HEAD = "file,constellation_deg,exposure_s,iso,f_number\n"
 
@@ -45,13 +51,13 @@ def test_a_list_is_read_with_all_its_columns(folder):
     assert dark.constellation_deg is None
 
 
-def test_a_rule_numbers_the_angles_when_an_exposure_comes_again(folder):
+def test_a_rule_starts_a_new_angle_when_an_exposure_repeats(folder):
     text = "file,exposure_s,iso,f_number\n" + "".join(f"{k}.npy,{(1, 4)[k % 2]},100,8\n" for k in range(6))
     found = listed(folder, text, AngleRule(1.0, 0.2))
     assert [one.constellation_deg for one in found] == pytest.approx([1.0, 1.0, 1.2, 1.2, 1.4, 1.4])
 
 
-def test_a_folder_of_raw_files_tells_its_exposures_itself(tmp_path):
+def test_raw_files_provide_their_exposures(tmp_path):
     for k in range(4):
         write_dng(tmp_path / f"IMG_{k}.dng", np.full((4, 4), 600, np.uint16), exposure=(1, (8, 2)[k % 2]))
     found = read_captures(tmp_path, parse_rule("10-0.5"))
@@ -63,7 +69,7 @@ def test_a_folder_of_raw_files_tells_its_exposures_itself(tmp_path):
         read_captures(tmp_path)
 
 
-def test_raw_files_tell_their_focal_length_though_a_list_tells_the_rest(tmp_path):
+def test_raw_files_provide_their_focal_length_beside_a_list(tmp_path):
     write_dng(tmp_path / "a.dng", np.full((4, 4), 600, np.uint16), exposure=(1, 8))
     (tmp_path / "b.dng").write_bytes(b"damaged")
     row = "{}.dng,{},1,100,8{}\n"
@@ -73,7 +79,7 @@ def test_raw_files_tell_their_focal_length_though_a_list_tells_the_rest(tmp_path
     assert (found.exposure_s, found.iso, found.f_number, found.focal_mm) == (1.0, 100.0, 8.0, 50.0)
     (tmp_path / "list.csv").write_text(head.format(",focal_mm") + row.format("a", 1, ",35"))
     assert read_captures(tmp_path / "list.csv")[0].focal_mm == 35.0
-    # merging tells of a damaged one
+    # merging reports a damaged file
     (tmp_path / "list.csv").write_text(head.format("") + row.format("b", 1, ""))
     assert read_captures(tmp_path / "list.csv")[0].focal_mm is None
 
@@ -84,7 +90,7 @@ def test_rules_are_start_and_step(text, rule):
 
 
 @pytest.mark.parametrize("text", ["", "3", "a+b", "1+0", "1++2", "nan+1", "0+1e3x"])
-def test_what_is_no_rule_is_told(text):
+def test_an_invalid_rule_is_reported(text):
     with pytest.raises(FlarewrightError, match="rule"):
         parse_rule(text)
 
@@ -99,9 +105,8 @@ def test_what_is_no_rule_is_told(text):
         (HEAD + "0.npy,0,1,100\n9.npy,1,1,100,8\n", "9.npy does not exist"),
         (HEAD + "0.npy,0,-1,100,8\n", "line 2: exposure_s"),
         (HEAD + "0.npy,0,1,100,8\n0.npy,1,1,100,8\n", "listed twice"),
-        (HEAD + "0.npy,0,,100,8\n", "0.npy in line 2 does not tell its exposure_s"),
+        (HEAD + "0.npy,0,,100,8\n", "0.npy in line 2 has no exposure_s"),
         (HEAD + "0.npy,,1,100,8\n", "constellation_deg is missing"),
-        (HEAD + "0.npy,0,1,100,8\n1.npy,2,1,100,8\n2.npy,1,1,100,8\n", "out of order: 1 deg follows 2 deg"),
         (HEAD + "0.npy,0,1,100,8\n1.npy,0,2,100,8\n2.npy,1,1,100,8\n", "1 deg lacks the exposure of 2 s"),
         (HEAD + "0.npy,0,1,100,8,,\n", "more cells"),
         ("file,exposure_s,kind\n0.npy,1,dark\n", "no capture of kind light"),
@@ -116,31 +121,31 @@ def test_what_is_no_rule_is_told(text):
         ),
     ],
 )
-def test_mistakes_are_told_with_their_place(folder, text, word):
+def test_errors_are_reported_with_their_place(folder, text, word):
     with pytest.raises(FlarewrightError, match=word):
         listed(folder, text)
 
 
-def test_one_mistake_is_told_once(folder):
-    with pytest.raises(FlarewrightError) as told:
+def test_one_error_is_reported_once(folder):
+    with pytest.raises(FlarewrightError) as reported:
         listed(folder, "file,constellation_deg\n0.npy,\n9.npy,0\n1.npy,1\n")
-    assert [line.partition(";")[0] for line in told.value.problems] == [
+    assert [line.partition(";")[0] for line in reported.value.problems] == [
         f"line 3: {folder / '9.npy'} does not exist: check the path and the spelling",
-        "2 of 3 photographs do not tell their exposure_s, the first is 0.npy in line 2",
+        "2 of 3 photographs have no exposure_s, the first is 0.npy in line 2",
     ]
 
 
-def test_a_folder_whose_files_tell_no_exposure_is_one_sentence(folder, capsys):
+def test_files_without_exposure_are_reported_in_one_sentence(folder, capsys):
     count = len(list(folder.glob("*.npy")))
     assert run(["measure", "merge", str(folder), "--angles", "0+1", "-o", str(folder / "run")]) == 2
     assert capsys.readouterr().err == (
-        f"flarewright: error: {folder}: {count} of {count} photographs do not tell their exposure_s, the first is "
+        f"flarewright: error: {folder}: {count} of {count} photographs have no exposure_s, the first is "
         "0.npy; list them in a captures.csv with file and exposure_s\n"
     )
     for path in folder.glob("*.npy"):
         path.rename(path.with_suffix(".dng"))
     assert run(["measure", "merge", str(folder), "--angles", "0+1", "-o", str(folder / "run")]) == 2
-    # damaged ones are told one by one, each named once
+    # each damaged file is reported once
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == count + 1
     assert all(line.count(".dng") == 1 for line in lines)
@@ -151,8 +156,8 @@ def test_an_f_number_may_be_unknown_or_rounded(folder):
     assert [one.f_number for one in found] == [None, 5.6, 5.66]
 
 
-def test_angles_are_told_once(folder):
-    with pytest.raises(FlarewrightError, match=r"tells constellation_deg of 1\.npy, and so does the rule 0\+0\.5"):
+def test_two_sources_of_angles_are_refused(folder):
+    with pytest.raises(FlarewrightError, match=r"gives constellation_deg of 1\.npy, and so does the rule 0\+0\.5"):
         listed(folder, HEAD + "0.npy,,1,100,8\n1.npy,7,1,100,8\n", AngleRule(0.0, 0.5))
 
 
@@ -165,15 +170,52 @@ def test_the_camera_file_is_checked(tmp_path):
     path.write_text('{"luminance_cd_m2": 2e6, "solid_angle_sr": 6.283}')
     assert read_camera(path).solid_angle_sr == 6.283
     for text, word in (
-        ("{", "not JSON"),
+        ("{", "not valid JSON"),
         ('{"gain": 1}', "gain"),
         ('{"electrons_per_unit": -1}', "electrons_per_unit"),
         ('{"black_level": 512, "white_level": 511}', "white_level 511 is not above black_level 512"),
         ('{"luminance_cd_m2": 2e6}', "luminance_cd_m2 and solid_angle_sr of the light go together; give both or none"),
         ('{"luminance_cd_m2": 0, "solid_angle_sr": 1e-5}', "luminance_cd_m2"),
         ('{"luminance_cd_m2": 2e6, "solid_angle_sr": 1e999}', "solid_angle_sr"),
-        ('{"luminance_cd_m2": 2e6, "solid_angle_sr": 6.284}', "solid_angle_sr: 6.284 is more than a light in front"),
+        ('{"luminance_cd_m2": 2e6, "solid_angle_sr": 6.284}', "solid_angle_sr: 6.284 is more than the hemisphere"),
     ):
         path.write_text(text)
         with pytest.raises(FlarewrightError, match=word):
             read_camera(path)
+
+
+THREE = "".join(f"{3 * k + j}.npy,{k},{2**j},100,8\n" for k in range(2) for j in range(3))
+
+
+def test_lines_in_any_order_are_sorted_and_this_is_reported(folder):
+    lines = THREE.splitlines(keepends=True)
+    (folder / "captures.csv").write_text(HEAD + "".join([lines[k] for k in (0, 3, 1, 5, 2, 4)]))
+    found, remarks = read_capture_list(folder / "captures.csv")
+    assert [one.constellation_deg for one in found] == [0.0] * 3 + [1.0] * 3
+    assert remarks == ("the lines are not in the order of their angles; sorted",)
+    # angles that fall throughout are in order
+    (folder / "captures.csv").write_text(HEAD + "".join(lines[3:] + lines[:3]))
+    assert read_capture_list(folder / "captures.csv")[1] == ()
+
+
+def test_one_lost_photograph_is_left_out_where_two_others_remain(folder):
+    lines = THREE.splitlines(keepends=True)
+    (folder / "captures.csv").write_text(HEAD + THREE)
+    assert read_capture_list(folder / "captures.csv")[1] == ()
+    # not listed
+    (folder / "captures.csv").write_text(HEAD + "".join(lines[:4] + lines[5:]))
+    found, (remark,) = read_capture_list(folder / "captures.csv")
+    assert len(found) == 5
+    assert remark == "the constellation of 1 deg lacks the exposure of 2 s that others have; merged from the other 2"
+    # listed, but not on the disk
+    (folder / "captures.csv").write_text(HEAD + THREE)
+    (folder / "4.npy").unlink()
+    found, remarks = read_capture_list(folder / "captures.csv")
+    assert [one.file for one in found] == ["0.npy", "1.npy", "2.npy", "3.npy", "5.npy"]
+    assert [line.partition(f"{folder}")[0] for line in remarks] == ["line 6: ", remark]
+    assert "4.npy does not exist; left out" in remarks[0]
+    # a second one of the same constellation
+    (folder / "3.npy").unlink()
+    with pytest.raises(FlarewrightError, match="does not exist: check the path") as reported:
+        read_capture_list(folder / "captures.csv")
+    assert len(reported.value.problems) == 2

@@ -1,4 +1,4 @@
-"""`flarewright measure merge` and `run`: JSON, a picture, and every mistake in one sentence."""
+"""`flarewright measure merge` and `run`: JSON, a picture, and one sentence for every error."""
 
 import errno
 import json
@@ -10,7 +10,7 @@ import pytest
 from star_run import ANGLES, CAMERA, light_px, shoot, star
 
 from flarewright.cli.app import run
-from flarewright.io.merged import read_run
+from flarewright.io.measurement.merged import read_run
 
 
 @pytest.fixture
@@ -21,25 +21,27 @@ def listed(tmp_path):
 def refused(capsys, *arguments):
     """Run a command that must fail with one sentence; return it."""
     assert run([str(word) for word in arguments]) == 2
-    out, told = capsys.readouterr()
+    out, reported = capsys.readouterr()
     assert out == ""
-    lines = [line for line in told.splitlines() if "error:" in line]
+    lines = [line for line in reported.splitlines() if "error:" in line]
     assert len(lines) == 1
-    assert "Traceback" not in told
+    assert "Traceback" not in reported
     return lines[0]
 
 
-def test_merge_tells_what_it_found_and_run_takes_it_up(listed, tmp_path, capsys):
+def test_merge_reports_its_result_and_run_continues(listed, tmp_path, capsys):
     folder = tmp_path / "run"
     assert run(["measure", "merge", str(listed), "-o", str(folder), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["stages"] == ["merge"]
-    assert told["merge"]["frames"] == told["merge"]["light_found"] == len(ANGLES)
-    assert told["merge"]["px_per_rad"] == pytest.approx(400.0, rel=0.01)
-    # how the horizon tilts is told where the light is off the axis, and at which angles
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["stages"] == ["merge"]
+    assert reported["merge"]["frames"] == reported["merge"]["light_found"] == len(ANGLES)
+    assert reported["merge"]["px_per_rad"] == pytest.approx(400.0, rel=0.01)
+    # the tilt of the horizon is reported where the light is off axis, with the range of angles
     frames = {frame.constellation_deg: frame.horizon_deg for frame in read_run(folder).frames}
-    assert len(told["merge"]["horizon_deg"]) == len(ANGLES) - sum(abs(angle) <= 1.0 for angle in frames) > 2
-    for angle, tilt in zip(told["merge"]["horizon_constellation_deg"], told["merge"]["horizon_deg"], strict=True):
+    assert len(reported["merge"]["horizon_deg"]) == len(ANGLES) - sum(abs(angle) <= 1.0 for angle in frames) > 2
+    for angle, tilt in zip(
+        reported["merge"]["horizon_constellation_deg"], reported["merge"]["horizon_deg"], strict=True
+    ):
         assert frames[angle] == tilt
     assert (folder / "merged.png").stat().st_size > 1000
     before = (folder / "frames" / "frame-003.exr").stat().st_mtime_ns
@@ -58,13 +60,13 @@ def test_a_folder_with_a_rule_and_blocks(tmp_path, capsys):
     (shots / "captures.csv").write_text("\n".join(lines))
     arguments = ["measure", "merge", str(shots / "captures.csv"), "--angles", "0+1", "--block", "2"]
     assert run([*arguments, "--white-balance", "2,1,1.5", "-o", str(tmp_path / "run"), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)["merge"]
-    assert told["size_px"] == [48, 32]
-    assert told["px_per_rad"] == pytest.approx(200.0, rel=0.01)
+    reported = json.loads(capsys.readouterr().out)["merge"]
+    assert reported["size_px"] == [48, 32]
+    assert reported["px_per_rad"] == pytest.approx(200.0, rel=0.01)
     assert read_run(tmp_path / "run").white_balance == (2.0, 1.0, 1.5)
 
 
-def test_scenes_that_cannot_be_measured_are_told(tmp_path, capsys):
+def test_scenes_that_cannot_be_measured_are_refused(tmp_path, capsys):
     veil = star(level=0.2)
     cases = {
         "no light was found": dict.fromkeys(ANGLES, veil),
@@ -78,7 +80,7 @@ def test_scenes_that_cannot_be_measured_are_told(tmp_path, capsys):
         assert words in refused(capsys, "measure", "merge", shoot(folder, scenes), "-o", folder / "run")
 
 
-def test_photographs_that_cannot_be_used_are_told(listed, tmp_path, capsys):
+def test_photographs_that_cannot_be_used_are_refused(listed, tmp_path, capsys):
     command = ("measure", "merge", listed, "-o", tmp_path / "run")
     whole = (tmp_path / "2-1.npy").read_bytes()
     np.save(tmp_path / "2-1.npy", np.zeros((64, 95, 3), np.uint16))
@@ -97,11 +99,11 @@ def test_photographs_that_cannot_be_used_are_told(listed, tmp_path, capsys):
     assert "2 deg lacks the exposure of 0.125 s" in refused(capsys, *command)
 
 
-def test_pictures_without_light_and_a_list_without_exposures_are_told(listed, tmp_path, capsys):
+def test_pictures_without_light_and_a_list_without_exposures_are_refused(listed, tmp_path, capsys):
     command = ("measure", "merge", listed, "-o", tmp_path / "run")
     text = listed.read_text()
     listed.write_text(text.replace("exposure_s", "focal_mm"))
-    assert "12 of 12 photographs do not tell their exposure_s" in refused(capsys, *command)
+    assert "12 of 12 photographs have no exposure_s" in refused(capsys, *command)
     listed.write_text(text)
     rng = np.random.default_rng(3)
     for path in tmp_path.glob("*.npy"):
@@ -110,7 +112,7 @@ def test_pictures_without_light_and_a_list_without_exposures_are_told(listed, tm
     assert "no light was found" in refused(capsys, *command)
 
 
-def test_folders_and_options_that_cannot_be_used_are_told(listed, tmp_path, capsys):
+def test_folders_and_options_that_cannot_be_used_are_refused(listed, tmp_path, capsys):
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "a.txt").write_text("mine")
     (tmp_path / "file").write_text("")
@@ -126,7 +128,7 @@ def test_folders_and_options_that_cannot_be_used_are_told(listed, tmp_path, caps
         assert words in refused(capsys, "measure", *arguments)
 
 
-def test_a_full_disk_is_told_before_and_while_writing(listed, tmp_path, capsys, monkeypatch):
+def test_a_full_disk_is_reported_before_and_while_writing(listed, tmp_path, capsys, monkeypatch):
     command = ("measure", "merge", listed, "-o", tmp_path / "run")
     usage = shutil.disk_usage(tmp_path)
     with monkeypatch.context() as patch:

@@ -1,4 +1,4 @@
-"""Photographs come in with the numbers that the sensor gave: RAW through the real decoder, TIFF, EXR, NPY."""
+"""Photographs are read with the numbers of the sensor: RAW through the real decoder, TIFF, EXR, NPY."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,8 @@ import tifffile
 from camera_raw import BLACK, WHITE, camera_to_rec709, write_dng
 
 from flarewright.errors import FlarewrightError
-from flarewright.io.exr import write_exr
-from flarewright.io.photo import open_photo, photo_facts
+from flarewright.io.images.exr import write_exr
+from flarewright.io.images.photo import open_photo, photo_facts
 from flarewright.model import Layer
 
 
@@ -30,7 +30,7 @@ def test_a_raw_file_keeps_its_photosites(tmp_path, mosaic):
     assert np.array_equal(pixels[..., 0], mosaic[::2, ::2])
     assert np.array_equal(pixels[..., 2], mosaic[1::2, 1::2])
     greens = (mosaic[::2, 1::2].astype(np.float32) + mosaic[1::2, ::2]) / 2
-    greens[5, 6] = WHITE  # a block is clipped when a part of it is
+    greens[5, 6] = WHITE  # a block is clipped when any of its pixels is
     assert np.array_equal(pixels[..., 1], greens)
     assert np.array_equal(photo.rows(3, 9), pixels[3:9])
     assert photo_facts(tmp_path / "a.dng") == pytest.approx(
@@ -39,7 +39,7 @@ def test_a_raw_file_keeps_its_photosites(tmp_path, mosaic):
 
 
 @pytest.mark.parametrize("damage", ["cut", "noise", "empty"])
-def test_a_damaged_raw_file_is_told_in_a_sentence(tmp_path, capfd, mosaic, damage):
+def test_a_damaged_raw_file_is_one_sentence(tmp_path, capfd, mosaic, damage):
     path = tmp_path / "a.dng"
     write_dng(path, mosaic)
     data = path.read_bytes()
@@ -67,7 +67,7 @@ def test_tiff_exr_and_npy_hold_the_same_numbers(tmp_path):
 
 @pytest.mark.parametrize("damage", ["cut", "hole"])
 @pytest.mark.parametrize("name", ["a.exr", "packed.tif"])
-def test_damaged_packed_pixels_are_told_in_a_sentence(tmp_path, capfd, name, damage):
+def test_damaged_packed_pixels_are_one_sentence(tmp_path, capfd, name, damage):
     numbers = np.random.default_rng(3).integers(0, 60000, (64, 96, 3), dtype=np.uint16)
     path = tmp_path / name
     if name.endswith(".exr"):
@@ -83,7 +83,7 @@ def test_damaged_packed_pixels_are_told_in_a_sentence(tmp_path, capfd, name, dam
     assert capfd.readouterr() == ("", "")
 
 
-def test_blocks_are_means_and_clip_when_a_part_does(tmp_path):
+def test_blocks_are_means_and_clipped_when_any_pixel_is(tmp_path):
     rng = np.random.default_rng(3)
     numbers = rng.integers(0, 900, (13, 17, 3), dtype=np.uint16)
     numbers[4, 5, 1] = 1000
@@ -107,10 +107,10 @@ def test_blocks_are_means_and_clip_when_a_part_does(tmp_path):
         ("a.npy", b"junk", "cannot be read as an NPY"),
         ("a.tif", b"junk", "cannot be read as a TIFF"),
         ("a.exr", b"junk", "cannot be read as an EXR"),
-        ("a.jpg", b"junk", "no photograph in linear numbers"),
+        ("a.jpg", b"junk", "no photograph with linear values"),
     ],
 )
-def test_what_is_no_linear_photograph_is_refused(tmp_path, name, content, word):
+def test_a_file_that_is_no_linear_photograph_is_refused(tmp_path, name, content, word):
     path = tmp_path / name
     if isinstance(content, bytes):
         path.write_bytes(content)
@@ -122,26 +122,30 @@ def test_what_is_no_linear_photograph_is_refused(tmp_path, name, content, word):
         open_photo(tmp_path / "other.npy")
 
 
-def test_pixels_that_are_no_numbers_are_refused(tmp_path):
+def test_pixels_that_are_not_finite_are_refused(tmp_path):
     pixels = np.ones((4, 5, 3), np.float32)
     pixels[2, 1, 0] = np.nan
     np.save(tmp_path / "a.npy", pixels)
     photo = open_photo(tmp_path / "a.npy")
     assert photo.rows(0, 2).shape == (2, 5, 3)
-    with pytest.raises(FlarewrightError, match="not a number"):
+    with pytest.raises(FlarewrightError, match="infinite or NaN"):
         photo.rows(0, 4)
+    pixels[2, 1, 0] = 1e38
+    np.save(tmp_path / "b.npy", pixels)
+    with pytest.raises(FlarewrightError, match=r"pixels above 1e\+12"):
+        open_photo(tmp_path / "b.npy").rows(0, 4)
 
 
-def test_an_x_trans_mosaic_is_refused_in_a_sentence(tmp_path, mosaic):
+def test_an_x_trans_mosaic_is_refused(tmp_path, mosaic):
     # Fujifilm's pattern of six by six; 0 red, 1 green, 2 blue
     rows = ("110112", "112110", "201021", "112110", "110112", "021201")
     write_dng(tmp_path / "x.dng", mosaic, pattern=tuple(tuple(map(int, row)) for row in rows))
-    with pytest.raises(FlarewrightError, match=r"x\.dng has an X-Trans mosaic.* linear 16-bit TIFF") as told:
+    with pytest.raises(FlarewrightError, match=r"x\.dng has an X-Trans mosaic.* linear 16-bit TIFF") as reported:
         open_photo(tmp_path / "x.dng")
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(reported.value)
 
 
-def test_the_cameras_colour_matrix_comes_through_the_decoder(tmp_path, mosaic):
+def test_the_decoder_returns_the_colour_matrix(tmp_path, mosaic):
     write_dng(tmp_path / "a.dng", mosaic)
     found = open_photo(tmp_path / "a.dng").to_rec709
     np.testing.assert_allclose(found, camera_to_rec709(), rtol=1e-3, atol=1e-3)

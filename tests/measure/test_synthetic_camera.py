@@ -1,4 +1,4 @@
-"""The synthetic camera, which judges everything else in this folder, photographs what it says it does."""
+"""The synthetic camera, on which other tests rely, matches its specification."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -19,10 +19,10 @@ from synthetic_camera import (
     truth_of,
 )
 
-from flarewright.render.direct import direct_image
-from flarewright.render.opening import make_opening
-from flarewright.render.prepare import settle
-from flarewright.render.shots import make_shots
+from flarewright.render.scene.direct_image import direct_image
+from flarewright.render.scene.opening import make_opening
+from flarewright.render.scene.resolve import resolve_project
+from flarewright.render.scene.shots import make_shots
 
 SMALL = Setup(size_px=(90, 60), angles_deg=(0.0, 6.0, 12.0), sensor_width_mm=36.0, axis_offset_px=(1, -1))
 
@@ -34,7 +34,7 @@ def scene():
     return pose, scale, truth_of(SMALL, pose, scale)
 
 
-def test_photographs_have_the_mean_and_the_variance_of_photons_and_reading(scene):
+def test_photographs_have_the_mean_and_variance_of_photon_and_read_noise(scene):
     _, _, truth = scene
     time, count = SMALL.exposures_s[-1], 24
     shots = np.stack([expose(SMALL, truth.total, time, 1.0, (k,)) for k in range(count)])
@@ -76,7 +76,7 @@ def test_the_light_is_where_the_star_is_and_ghosts_where_their_light_is(scene):
         assert np.abs(one.outline_px.mean(axis=0) - one.centre_px).max() < 5.0
 
 
-def test_a_perfect_table_turns_as_told_and_an_ideal_frame_is_the_truth(scene):
+def test_a_perfect_table_has_nominal_angles_and_an_ideal_frame_is_the_truth(scene):
     perfect = poses(SMALL.steady)
     assert [one.constellation_deg for one in perfect] == pytest.approx(SMALL.angles_deg)
     assert [one.field_deg[1] for one in perfect] == pytest.approx([0.0] * 3)
@@ -87,6 +87,7 @@ def test_a_perfect_table_turns_as_told_and_an_ideal_frame_is_the_truth(scene):
     assert frame.valid.mean() > 0.9
 
 
+@pytest.mark.slow
 def test_truth_is_the_same_at_two_densities_of_rays():
     coarse = replace(SMALL, lens="flektogon-35", quality="final", size_px=(90, 60), f_number=5.6, wavelengths=1)
     fine = replace(coarse, tolerance_px=0.06)
@@ -97,38 +98,38 @@ def test_truth_is_the_same_at_two_densities_of_rays():
     assert one.sum() == pytest.approx(other.sum(), rel=2e-3)
 
 
-def test_a_light_that_the_rims_hide_goes_on_where_the_lens_would_image_it():
+def test_a_light_hidden_by_rims_has_an_extrapolated_position():
     setup = Setup(
         lens="takumar-50-f1.4", f_number=5.6, angles_deg=tuple(range(2, 30, 3)), size_px=(90, 60), tilt_deg=0.0,
         axis_offset_px=(1, -1), wander_deg=0.0, pitch_deg=0.0, pitch_wander_deg=0.0,
     )  # fmt: skip
     places = []
     for pose in poses(setup):
-        settled = settle(project_of(setup, pose, "passes"))
+        settled = resolve_project(project_of(setup, pose, "passes"))
         image = direct_image(settled.lens, make_shots(settled, make_opening(settled, None))[0])
         places.append((*image.position_mm, *dark_mm(setup, pose), bool(image.throughput_mm2.any())))
     table = np.array(places)
     lit = table[:, 4] > 0.0
     assert lit[:6].all()
-    # the law misses what it was learned from by less than a pixel of 90, and ends beyond all of it
+    # the projection fits its samples to less than one pixel of 90, and extrapolates beyond them
     assert np.hypot(*(table[lit, :2] - table[lit, 2:4]).T).max() < 36.0 / 90.0
     assert (np.diff(table[:, 2]) > 0.0).all()
-    # what is dark lies at the ideal place in a rendering, never in the middle
+    # a rendering places a dark light at its ideal position, not at the centre
     assert (table[:, 0] > 0.0).all()
 
 
-def test_the_last_rays_of_a_light_are_its_image_and_tell_no_place(scene):
+def test_the_last_rays_of_a_light_do_not_define_its_position(scene):
     pose, _, _ = scene
 
     def places(passed):
-        told = {"direct_throughput_mm2": [passed, 0.5 * passed], "direct_position_mm": (-9.0, 4.0)}
-        return light_places(SMALL, pose, SimpleNamespace(summary={"lights": [told]}))
+        reported = {"direct_throughput_mm2": [passed, 0.5 * passed], "direct_position_mm": (-9.0, 4.0)}
+        return light_places(SMALL, pose, SimpleNamespace(summary={"lights": [reported]}))
 
     image = (0.5 * 90 + 1 - 9.0 * 2.5, 0.5 * 60 - 1 - 4.0 * 2.5)
     most = truth_of(SMALL, pose, 1.0).light_px
     assert places(1e4) == (image, image)
     light, there = places(1e-3)
     assert there == image
-    # where the lens' law has it, as it was while it shone
+    # the position follows the projection of the lens, as for a visible light
     assert light == pytest.approx(most, abs=0.2)
     assert places(0.0) == (light, light)

@@ -1,9 +1,9 @@
-"""The reference as the judge of final quality: block by block, with regard to its own variance.
+"""Test final quality against the reference, block by block, with the reference's variance.
 
-Two tests. Chi-squared over all blocks asks whether there is more difference than chance makes; the largest deviation,
-with Bonferroni's correction, asks whether any one block is wrong. Both allow final quality what it states for itself
-(docs/accuracy.md), added to the variance: 0.2 % of a block's flux, and 1e-4 of the mean block's, which decides where it
-is nearly dark.
+There are two tests. Chi-squared over all blocks tests whether there is more difference than chance explains; the
+largest deviation, with Bonferroni's correction, tests whether any single block is wrong. Both add the stated error of
+final quality (docs/accuracy.md) to the variance: 0.2 % of a block's flux, and 1e-4 of the mean block's, which dominates
+in nearly dark blocks.
 """
 
 from __future__ import annotations
@@ -13,33 +13,33 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from flarewright.kernels.montecarlo import BESIDE, IN_PICTURE
+from flarewright.kernels.montecarlo.forward import BESIDE, IN_PICTURE
 from flarewright.model import Project
-from flarewright.optics.color import luminance_weights
-from flarewright.render.montecarlo import BLOCK, FOLLOWED, Sums, ray_source, run_batch
-from flarewright.render.opening import make_opening
-from flarewright.render.prepare import settle
+from flarewright.optics.colour.rgb import luminance_weights
+from flarewright.render.reference.batches import BLOCK, FOLLOWED, Sums, ray_source, run_batch
 from flarewright.render.render import Rendering, render
-from flarewright.render.shots import make_shots
+from flarewright.render.scene.opening import make_opening
+from flarewright.render.scene.resolve import resolve_project
+from flarewright.render.scene.shots import make_shots
 
 STATED, STATED_DARK = 2e-3, 1e-4
 
 
 @dataclass(frozen=True)
 class Judged:
-    """Luminous flux by final quality and by the reference.
+    """Luminous flux from final quality and from the reference.
 
     Attributes
     ----------
     final, mean, variance : ndarray, shape (A, B)
         Blocks of 16 x 16 pixels, two reflections only.
     paths : dict of str to tuple of float
-        By path: final quality's flux in the picture, the reference's, its standard error.
+        By path: flux in the picture from final quality and from the reference, and its standard error.
     batches : int
     total : tuple of float
-        Final quality's flux in the picture, the reference's, its standard error.
+        Flux in the picture from final quality and from the reference, and its standard error.
     high_share : float
-        Part of the ghosts' flux in the picture that comes by more than two reflections, from the reference.
+        Part of the ghosts' flux in the picture from more than two reflections, from the reference.
     """
 
     final: np.ndarray
@@ -64,8 +64,8 @@ def blocks_of(pixels: np.ndarray, window: tuple[int, int, int, int], project: Pr
 
 
 def gather(project: Project, batches: int, side: int, *, fours: bool = False) -> Sums:
-    """Trace the reference at the wavelengths that final quality traces; `fours`: to four reflections, no more."""
-    settled = settle(project)
+    """Trace the reference at the wavelengths of final quality; `fours`: with two and four reflections only."""
+    settled = resolve_project(project)
     shots = make_shots(settled, make_opening(settled, None))
     followed = (4.0, 0.0) if fours else (FOLLOWED, FOLLOWED)
     sources = [ray_source(shot, 0, side=side, light=k, followed=followed) for k, shot in enumerate(shots)]
@@ -79,7 +79,7 @@ def gather(project: Project, batches: int, side: int, *, fours: bool = False) ->
 
 
 def judge(project: Project, *, batches: int = 64, side: int = 128, fours: bool = False) -> Judged:
-    """Render a project by both.
+    """Render a project with both.
 
     Parameters
     ----------
@@ -88,8 +88,8 @@ def judge(project: Project, *, batches: int = 64, side: int = 128, fours: bool =
     batches, side : int
         Of the reference.
     fours : bool
-        Whether to judge the blocks and the total of four reflections instead of two; `final` and `paths` are of two
-        reflections in any case.
+        Whether to compare blocks and total of four reflections instead of two. `final` and `paths` are always of two
+        reflections.
     """
     sums = gather(project, batches, side, fours=fours)
     rendering: Rendering = render(project)
@@ -116,24 +116,24 @@ def judge(project: Project, *, batches: int = 64, side: int = 128, fours: bool =
 
 
 def deviations(judged: Judged, final: np.ndarray | None = None) -> np.ndarray:
-    """Return each lit block's difference in standard errors, those of a normal variable if final quality is right.
+    """Return the difference of each lit block in standard errors: normal variables if final quality is correct.
 
     Raises
     ------
     AssertionError
-        When final quality puts more than 1e-4 of its light where the reference saw none.
+        Final quality has more than 1e-4 of its light where the reference has none.
     """
     F = judged.final if final is None else final
     lit = judged.variance > 0.0
     assert F[~lit].sum() <= 1e-4 * F.sum()
     stated = (STATED * F[lit]) ** 2 + (STATED_DARK * F.mean()) ** 2
     z = (F - judged.mean)[lit] / np.sqrt(judged.variance[lit] + stated)
-    # a variance from n batches makes it a t variable; to the same probability of a normal one
+    # a variance from n batches makes it a t variable; convert it to a normal variable of equal probability
     return stats.norm.isf(stats.t.sf(z, judged.batches - 1))
 
 
 def probabilities(judged: Judged, final: np.ndarray | None = None) -> tuple[float, float]:
-    """Return how probable so much difference is by chance: over all blocks, and of the worst one."""
+    """Return the probabilities of such differences by chance: over all blocks, and for the worst block."""
     z = deviations(judged, final)
     everywhere = float(stats.chi2.sf((z**2).sum(), z.size))
     worst = float(min(1.0, 2.0 * z.size * stats.norm.sf(np.abs(z).max())))

@@ -1,6 +1,6 @@
-"""Run by `test_optiland.py` in an interpreter that has optiland: rays in by JSON, positions out by JSON.
+"""Trace rays with optiland: rays as JSON in, positions as JSON out. `test_optiland.py` runs this in a subprocess.
 
-A ghost path is laid out as a chain of surfaces with mirrors and negative gaps. Imports nothing of the program.
+A ghost path is unfolded into a chain of surfaces with mirrors and negative gaps. Imports nothing of Flarewright.
 """
 
 import json
@@ -27,7 +27,7 @@ def chain(job):
         order += [(k, False, True) for k in range(i + 1, n)]
     lens = Optic()
     lens.surfaces.add(index=0, radius=np.inf, thickness=np.inf)
-    # A plane at z = 0 starts the chain, so that the first surface may have any shape.
+    # A plane at z = 0 starts the chain, so that the first surface can have any shape.
     lens.surfaces.add(index=1, radius=np.inf, thickness=0.0, is_stop=True, material=IdealMaterial(1.0))
     at = [z[k] for k, _, _ in order] + [z[-1] + job["sensor_distance"]]
     for m, (k, mirror, forward) in enumerate(order):
@@ -42,7 +42,7 @@ def chain(job):
 
 
 def form(row):
-    """Shape and place of a row in optiland's words."""
+    """Return shape and position of a row as optiland's arguments."""
     radius = np.inf if row["curvature"] == 0.0 else 1.0 / row["curvature"]
     place = {name: row[name] for name in ("dx", "dy", "rx", "ry") if row.get(name)}
     exact = {"tol": 1e-13, "max_iter": 100}
@@ -51,7 +51,7 @@ def form(row):
         words = {"surface_type": "zernike", "radius": radius, "conic": row["conic"], **exact}
         return {**words, "coefficients": coefficients, "norm_radius": norm_radius, "zernike_type": "noll", **place}
     if row.get("asphere"):
-        # optiland's first coefficient is that of r^2
+        # optiland's first coefficient belongs to r^2
         coefficients = [0.0, *row["asphere"]]
         words = {"surface_type": "even_asphere", "radius": radius, "conic": row["conic"], **exact}
         return {**words, "coefficients": coefficients, **place}

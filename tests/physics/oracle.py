@@ -1,14 +1,14 @@
-"""The independent answer: a plain Monte Carlo tracer for two-reflection ghosts, NumPy, double precision.
+"""The oracle: a plain Monte Carlo tracer for two-reflection ghosts in NumPy, double precision.
 
-It exists to judge `flarewright`, so it shares no code with `flarewright.kernels` or `flarewright.optics`; from
-`flarewright.model` it reads data only. Where there is a choice it takes another road than the fast code:
+It tests `flarewright`, so it shares no code with `flarewright.kernels` or `flarewright.optics`; from
+`flarewright.model` it reads data only. Where there is a choice, it uses another method than the fast code:
 
 - spheres by their centre (physics.md, "Sequential tracing"), conics by the quadratic of their implicit form;
 - films by the recursive Airy sum, not by characteristic matrices;
 - regions by nested regular grids, integrals by jittered strata in replicas, so that every number has a standard error.
 
 Conventions are those of physics.md: mm, light along +z, vertices on the axis, rows counted from 0 with the stop as a
-row. Positions on the sensor are in the upright picture, (-x, -y) of the sensor's own coordinates.
+row. Positions on the sensor are in the upright picture, (-x, -y) of the sensor's coordinates.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ Path = tuple[int, ...] | None
 """(first mirror j, second mirror i < j), or None for the direct image."""
 
 FAR = 40.0
-"""A ray this many semi-diameters out is given up while regions are searched."""
+"""Rays farther out than this many semi-diameters are dropped while regions are searched."""
 
 
 @dataclass(frozen=True)
 class OracleRow:
-    """A surface and the gap behind it; `index` is that gap's index at the wavelength."""
+    """A surface and the gap behind it; `index` is the refractive index of that gap at the wavelength."""
 
     curvature: float
     thickness: float
@@ -45,7 +45,7 @@ class OracleRow:
 
 @dataclass(frozen=True)
 class System:
-    """Rows from front to back, and the sensor's distance behind the last vertex."""
+    """Rows from front to back, and the distance of the sensor behind the last vertex."""
 
     rows: tuple[OracleRow, ...]
     sensor_distance: float
@@ -87,21 +87,21 @@ class System:
 
 @dataclass(frozen=True)
 class Step:
-    """One meeting of a ray with a surface."""
+    """One intersection of a ray with a surface."""
 
     row: int
     mirror: bool
     forward: bool
-    """Whether the light runs along +z before the meeting."""
+    """Whether the light travels along +z before the intersection."""
     n_from: float
     n_to: float
-    """Index on the far side of the surface, for mirrors too."""
+    """Index on the far side of the surface, also for mirrors."""
     films: Films
-    """As the light meets them."""
+    """In the order in which light meets them."""
 
 
 def mirrors(system: System) -> list[int]:
-    """Return the rows that reflect: all but the stop, and but those with the same index on both sides and no film."""
+    """Return the rows that reflect: not the stop, and not surfaces with equal indices on both sides and no film."""
     return [k for k, row in enumerate(system.rows) if not row.is_stop]
 
 
@@ -112,7 +112,7 @@ def ghost_paths(system: System, same_side: bool = False) -> list[tuple[int, int]
 
 
 def steps(system: System, path: Path) -> list[Step]:
-    """Write out a path surface by surface."""
+    """Return the surfaces of a path in order."""
     rows = system.rows
     behind = [row.index for row in rows]
     front = [1.0, *behind[:-1]]
@@ -142,15 +142,15 @@ def steps(system: System, path: Path) -> list[Step]:
 def reflectance_sp(
     n_from: float, films: Films, n_to: float, cos_from: Array, wavelength_nm: float
 ) -> tuple[Array, Array]:
-    """Return R for s and p by summing the films' echoes from the far side inward (Airy, recursively)."""
+    """Return R for s and p by adding the films' reflections from the far side inward (Airy, recursively)."""
     n = [n_from, *(f[0] for f in films), n_to]
     d = [f[1] for f in films]
     cos_from = np.clip(np.asarray(cos_from, dtype=float), 0.0, 1.0)
     tangential = n_from**2 * (1.0 - cos_from**2)
-    # Beyond the critical angle the cosine is +i |..|, so that waves decay into the far side.
+    # Beyond the critical angle the cosine is +i |..|, so that waves decay on the far side.
     cosines = [np.sqrt((1.0 - tangential / m**2).astype(complex)) for m in n]
     cosines[0] = cos_from.astype(complex)
-    # what a film turns the phase by, there and back, is the same for both
+    # the phase of a double pass through a film is equal for both polarisations
     turns = [np.exp(4j * np.pi / wavelength_nm * m * e * c) for m, e, c in zip(n[1:], d, cosines[1:], strict=False)]
     out = []
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -174,7 +174,7 @@ def reflectance(n_from: float, films: Films, n_to: float, cos_from: Array, wavel
     if not films:
         if n_from == n_to:
             return np.zeros_like(cos_from)
-        # Bare surfaces in real numbers, for speed.
+        # Real arithmetic for bare surfaces, for speed.
         c0 = np.clip(cos_from, 0.0, 1.0)
         s2 = (n_from / n_to) ** 2 * (1.0 - c0**2)
         c1 = np.sqrt(np.clip(1.0 - s2, 0.0, None))
@@ -191,20 +191,20 @@ def reflectance(n_from: float, films: Films, n_to: float, cos_from: Array, wavel
 
 @dataclass
 class Rays:
-    """What a bundle recorded; dead rays hold NaN."""
+    """Results of a bundle; dead rays hold NaN."""
 
     x: Array
     y: Array
-    """Sensor, upright picture."""
+    """Position on the sensor, upright picture."""
     weight: Array
     """Product of R and T, one row per set of films."""
     rel_radius: Array
     stop_x: Array
     stop_y: Array
-    """At the last crossing of the stop, in lens coordinates."""
+    """Position at the last crossing of the stop, in lens coordinates."""
     alive: NDArray[np.bool_]
     direction: Array
-    """(3, n), arriving at the sensor."""
+    """Direction at the sensor, shape (3, n)."""
 
 
 def _dot(a: Array, b: Array) -> Array:
@@ -213,7 +213,7 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _hit_sphere(o: Array, d: Array, z: float, curvature: float) -> tuple[Array, Array]:
-    """Return step and inner product form of physics.md: t = -D.d - sgn(R d_z) sqrt(...)."""
+    """Return step and inner product as in physics.md: t = -D.d - sgn(R d_z) sqrt(...)."""
     R = 1.0 / curvature
     D = o - np.array([[0.0], [0.0], [z + R]])
     b = _dot(D, d)
@@ -224,7 +224,7 @@ def _hit_sphere(o: Array, d: Array, z: float, curvature: float) -> tuple[Array, 
 
 
 def _hit_conic(o: Array, d: Array, z: float, c: float, k: float) -> tuple[Array, Array]:
-    """Meet c (x^2 + y^2 + (1 + k) z^2) - 2 z = 0 on the side of its vertex."""
+    """Intersect c (x^2 + y^2 + (1 + k) z^2) - 2 z = 0 on the side of its vertex."""
     p = o - np.array([[0.0], [0.0], [z]])
     A = c * (d[0] ** 2 + d[1] ** 2 + (1.0 + k) * d[2] ** 2)
     B = c * (p[0] * d[0] + p[1] * d[1] + (1.0 + k) * p[2] * d[2]) - d[2]
@@ -247,7 +247,7 @@ def _hit(o: Array, d: Array, z: float, row: OracleRow) -> tuple[Array, Array]:
 
 
 def direction(field_deg: tuple[float, float]) -> Array:
-    """Return the unit vector along which light from field angles (X, Y) runs."""
+    """Return the unit vector of light from field angles (X, Y)."""
     tx, ty = np.tan(np.radians(field_deg))
     v = np.array([-tx, -ty, 1.0])
     return v / np.sqrt(v @ v)
@@ -272,13 +272,13 @@ def trace(
     ----------
     x, y : ndarray, shape (n,)
     film_sets : list of films per row, optional
-        Several coatings of the same glass in one go; default is the system's own.
+        Several coatings of the same glass at once; default: that of the system.
     weigh : bool
         Whether to compute R and T.
     drop_beyond : float
-        Rays further out than this many semi-diameters are given up (as dead).
+        Rays farther out than this many semi-diameters are dropped (as dead).
     first : int
-        Rows before this one are left out: the light starts inside (tests of reversibility).
+        Skip rows before this one: the light starts inside the lens (tests of reversibility).
     """
     n = len(x)
     sets = [tuple(row.films for row in system.rows)] if film_sets is None else [tuple(s) for s in film_sets]
@@ -295,14 +295,14 @@ def trace(
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         for step in steps(system, path)[first:]:
             row = system.rows[step.row]
-            # Where the surface is met.
+            # Intersection.
             t, normal = _hit(o, d, z[step.row], row)
             o = o + t * d
             radius = np.hypot(o[0], o[1])
             rel = np.maximum(rel, radius / row.semi_diameter)
             if row.is_stop:
                 sx, sy = o[0].copy(), o[1].copy()
-            # Where it goes. The normal is turned against the ray.
+            # New direction; the normal is oriented against the ray.
             against = np.where(_dot(normal, d) > 0.0, -1.0, 1.0)
             normal = normal * against
             c = -_dot(normal, d)
@@ -317,9 +317,9 @@ def trace(
                     d = eta * d + (eta * c - np.sqrt(np.where(k >= 0.0, k, np.nan))) * normal
             ends_forward = step.forward != step.mirror
             ok &= d[2] > 0.0 if ends_forward else d[2] < 0.0
-            # What is lost.
+            # Losses.
             if weigh and not row.is_stop:
-                # sets that coat this surface alike share its R
+                # sets with the same coating on this surface share its R
                 known: dict[Films, Array] = {}
                 for s, films in enumerate(sets):
                     met = films[step.row] if step.forward else films[step.row][::-1]
@@ -348,7 +348,7 @@ def trace(
 
 
 def entrance_box(system: System, field_deg: tuple[float, float]) -> tuple[float, float, float, float]:
-    """Return (x0, x1, y0, y1) on z = 0 that holds every ray which can meet the first surface inside its rim."""
+    """Return (x0, x1, y0, y1) on z = 0 around all rays that can hit the first surface within its semi-diameter."""
     row = system.rows[0]
     h = row.semi_diameter
     sags = [0.0]
@@ -356,7 +356,7 @@ def entrance_box(system: System, field_deg: tuple[float, float]) -> tuple[float,
         R = 1.0 / row.curvature
         if h < abs(R) and row.conic == 0.0:
             sags.append(R - np.sign(R) * np.sqrt(R * R - h * h))
-            if h > 0.8 * abs(R):  # behind the equator, too
+            if h > 0.8 * abs(R):  # beyond the equator too
                 sags.append(2.0 * R)
         else:
             sags.append(2.0 * h * np.sign(R))
@@ -369,7 +369,7 @@ def entrance_box(system: System, field_deg: tuple[float, float]) -> tuple[float,
 
 @dataclass(frozen=True)
 class Region:
-    """Rectangles that hold all accepted rays of a path."""
+    """Rectangles that contain all accepted rays of a path."""
 
     x: Array
     y: Array
@@ -381,7 +381,7 @@ class Region:
         return Region(self.x[which], self.y[which], self.dx[which], self.dy[which])
 
     def split(self, m: int) -> Region:
-        """Return the m x m parts of every rectangle, parts of one rectangle side by side."""
+        """Return the m x m parts of every rectangle, ordered by rectangle."""
         ix, iy = (a.ravel() for a in np.meshgrid(np.arange(m), np.arange(m), indexing="ij"))
         dx, dy = self.dx / m, self.dy / m
         x, y = self.x[:, None] + ix * dx[:, None], self.y[:, None] + iy * dy[:, None]
@@ -397,7 +397,7 @@ class Region:
 
 
 def _spread(a: NDArray[Any], op: Any) -> NDArray[Any]:
-    """Apply `op` (maximum, minimum, or) over each element's 3 x 3 neighbourhood."""
+    """Apply `op` (maximum, minimum, or) over the 3 x 3 neighbourhood of each element."""
     for axis in (0, 1):
         b = a.copy()
         lo: list[slice] = [slice(None)] * 2
@@ -412,10 +412,10 @@ def _spread(a: NDArray[Any], op: Any) -> NDArray[Any]:
 def find_region(
     system: System, path: Path, field_deg: tuple[float, float], grid: int = 96, levels: int = 6
 ) -> Region | None:
-    """Close in on the accepted part of the entrance plane; None when no ray comes near.
+    """Find the accepted part of the entrance plane by nested grids; None if no ray comes close.
 
-    A cell stays when its least relative radius minus the largest change along an edge nearby is below 1, so a spot
-    smaller than a cell is seen by its slopes.
+    A cell is kept if its least relative radius minus the largest change along a nearby edge is below 1. So a spot
+    smaller than a cell is detected by the slopes around it.
     """
     x0, x1, y0, y1 = entrance_box(system, field_deg)
     for _ in range(levels):
@@ -430,7 +430,7 @@ def find_region(
         ey[~np.isfinite(ey)] = 0.0
         change = np.maximum(np.maximum(ex[:, :-1], ex[:, 1:]), np.maximum(ey[:-1], ey[1:]))
         least = np.minimum(np.minimum(f[:-1, :-1], f[1:, :-1]), np.minimum(f[:-1, 1:], f[1:, 1:]))
-        # The bottom of a cone in a cell lies at most one diagonal of slopes below its corners.
+        # The minimum of a cone in a cell lies at most one diagonal of slopes below its corners.
         cells = _spread(least, np.minimum) - 1.5 * _spread(change, np.maximum) <= 1.0
         if not cells.any():
             return None
@@ -452,7 +452,7 @@ def find_region(
 
 @dataclass(frozen=True)
 class Estimate:
-    """A path's flux, place and size, each with its standard error."""
+    """Flux, position and size of a path, each with its standard error."""
 
     path: Path
     throughput_mm2: float
@@ -462,17 +462,17 @@ class Estimate:
     rms_radius_mm: float
     rms_radius_se: float
     accepted: int
-    """Rays that counted, over all replicas."""
+    """Number of rays that count, over all replicas."""
     least_dz: float
-    """Least z component of the direction of a counted ray that carries light, at the sensor."""
+    """Least z component of the direction at the sensor, of the rays that count and carry light."""
 
     @property
     def size_exists(self) -> bool:
-        """Whether centroid and size are finite numbers at all.
+        """Whether centroid and size are finite.
 
-        When light leaves a bent last surface parallel to the sensor (d_z passes through 0 while T does not), positions
-        go like 1 / d_z with d_z spread evenly: the second moment on an unbounded plane is infinite and the first one
-        diverges like a logarithm.
+        When light leaves a curved last surface parallel to the sensor (d_z passes through 0 while T does not),
+        positions vary as 1 / d_z with uniformly distributed d_z: the second moment on an unbounded plane is infinite
+        and the first diverges logarithmically.
         """
         return self.least_dz > 1e-3
 
@@ -491,10 +491,10 @@ def refine(
     share: float = 2e-4,
     rounds: int = 14,
 ) -> Region:
-    """Split rectangles until none carries more than `share` of the doubt about flux or about size.
+    """Split rectangles until none causes more than `share` of the uncertainty of flux or of size.
 
-    Needed where a few steep rays land far away and rule the size. The final samples are drawn afresh: no bias from
-    looking.
+    This is needed where a few steep rays land far away and dominate the size. The final samples are drawn
+    independently, so the refinement causes no bias.
     """
     rng = np.random.default_rng([77, *(path or (999, 999))])
     done: list[Region] = []
@@ -538,7 +538,7 @@ def estimate(
     seed: int = 1,
     region: Region | None = None,
 ) -> list[Estimate] | None:
-    """Integrate one path, once per set of films; None when no ray counts."""
+    """Integrate one path, once per set of films; None if no ray counts."""
     if region is None:
         region = find_region(system, path, field_deg)
         if region is None:
@@ -600,9 +600,10 @@ def table(
     seed: int = 1,
     grid: int = 96,
 ) -> list[dict[Path, Estimate]]:
-    """Integrate every ghost above `floor` of the strongest (a rough first round finds them) and the direct path.
+    """Integrate the direct path and every ghost above `floor` of the strongest, as found by a rough first round.
 
-    Regions are searched by `grid` cells a side; each cell costs a ray a replica. Returns one table per set of films.
+    Regions are searched with `grid` cells per side; each cell costs one ray per replica. Returns one table per set of
+    films.
     """
     wanted = [None, *ghost_paths(system)] if paths is None else list(paths)
     sets = 1 if film_sets is None else len(film_sets)
@@ -635,7 +636,7 @@ def table(
 
 
 def _matrices(system: System, path: Path, to_stop: bool = False) -> Iterator[Array]:
-    """Yield the ray transfer matrices of a path in the order light meets them (physics.md)."""
+    """Yield the ray transfer matrices of a path in the order of the light (physics.md)."""
     z = system.vertices
     at = 0.0
     for step in steps(system, path):
@@ -667,12 +668,12 @@ def efl_bfl(system: System) -> tuple[float, float]:
 
 
 def focused(system: System) -> System:
-    """Put the sensor at the paraxial focus."""
+    """Return the system with the sensor at the paraxial focus."""
     return replace(system, sensor_distance=efl_bfl(system)[1])
 
 
 def stopped(system: System, f_number: float) -> System:
-    """Give the stop the opening of an f-number: the entrance pupil is efl / N wide."""
+    """Return the system with the stop of an f-number: the entrance pupil has the diameter efl / N."""
     half = abs(flare_matrix(system, None, to_stop=True)[0, 0] * efl_bfl(system)[0] / (2.0 * f_number))
     rows = tuple(replace(r, semi_diameter=half) if r.is_stop else r for r in system.rows)
     return replace(system, rows=rows)
@@ -682,7 +683,7 @@ def stopped(system: System, f_number: float) -> System:
 
 
 def films_of(coating: Any, n_front: float, n_behind: float) -> Films:
-    """Return the films, front to back, that a `flarewright.model.Coating` (or None) means between two media."""
+    """Return the films, front to back, of a `flarewright.model.Coating` (or None) between two media."""
     kind = "none" if coating is None else coating.kind
     if kind == "none":
         return ()
@@ -698,7 +699,7 @@ def films_of(coating: Any, n_front: float, n_behind: float) -> Films:
 
 
 def from_lens(lens: Any, f_number: float | None = None, sensor_distance: float | None = None) -> System:
-    """Read a frozen `flarewright.model.Lens` at the d line, with its own coatings; all semi-diameters must be known."""
+    """Convert a frozen `flarewright.model.Lens` at the d line, with its coatings; all semi-diameters must be known."""
     rows = []
     front = 1.0
     for row in lens.rows:
@@ -716,7 +717,7 @@ def from_lens(lens: Any, f_number: float | None = None, sensor_distance: float |
 
 
 def glass_air_films(system: System, coating: Any) -> list[Films]:
-    """Coat every surface between glass and air; cemented ones stay bare."""
+    """Coat all surfaces between glass and air; cemented ones stay bare."""
     out: list[Films] = []
     front = 1.0
     for row in system.rows:

@@ -1,9 +1,9 @@
-"""The flux of one two-reflection path by the reference's own rays: that path only, and most points where it passes.
+"""The flux of one two-reflection path from reference rays restricted to that path, concentrated where it passes.
 
-The reference splits every ray at every surface and meets a faint path once in a million. Here a ray takes the path's
-two reflections for certain and no other, with the same weights, so its mean is the same. A pilot finds the cells of the
-front through which the path reaches the picture; they are divided finely, and all the rest gets some points a batch
-too, so nothing is left out, and the variance tells what was met there by chance.
+The reference splits every ray at every surface and meets a faint path once in a million rays. Here a ray always takes
+the two reflections of the path, with the same weights, so its mean is the same. A pilot finds the cells of the front
+through which the path reaches the picture; these are sampled densely. All other cells get some points per batch too, so
+nothing is missed, and the variance includes what these points find.
 """
 
 from __future__ import annotations
@@ -11,23 +11,23 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from flarewright.kernels.montecarlo import _cross, _passes_stop
-from flarewright.optics.region import front_box
-from flarewright.render.montecarlo import spectrum_of
-from flarewright.render.shot import Shot
+from flarewright.kernels.montecarlo.forward import _cross, _passes_stop
+from flarewright.optics.rays.pupil_region import front_box
+from flarewright.render.reference.batches import spectrum_of
+from flarewright.render.scene.shot import Shot
 
-# cells of the front a side; where fewer than so many are known, they are divided into so many a side
+# cells of the front per side; if fewer than FEW are known, they are divided FINER times, up to FINEST per side
 CELLS, FEW, FINER, FINEST = 128, 200, 4, 2048
-# rays through a cell beside one that light passes
+# rays through a cell next to one that light passes
 NEARER = 6
-# points of a batch in cells that the path is known to pass; and a side, one in each, in all others
+# points per batch in known cells; and per side, one in each, in all others
 POINTS, COARSE = 12_000, 64
 
 
 @njit(error_model="numpy", cache=True)
 def follow(curvature, form, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, j, i, direction, x0, y0,
            blades, to_pixels, size, light):  # fmt: skip
-    """Fill `light` with what is left of each ray from x0, y0 that reflects at j, then at i: 0 beside the picture."""
+    """Set `light` to the weight of each ray from x0, y0 that reflects at j, then at i; 0 outside the picture."""
     samples = reflectance.shape[1]
     for ray in range(x0.shape[0]):
         x, y, z = x0[ray], y0[ray], 0.0
@@ -70,7 +70,7 @@ def follow(curvature, form, z_vertex, inv_semi, n_gap, reflectance, sensor_z, st
 
 
 def path_flux(shot: Shot, j: int, i: int, batches: int, seed: int = 0) -> tuple[float, float]:
-    """Luminous flux in the picture of one path by a distant light at one wavelength, and its standard error."""
+    """Return the luminous flux in the picture of one path, for a distant monochromatic light, and its error."""
     packed, opening = shot.packed, shot.opening
     tilt, axes = shot.incidence.tilt, shot.incidence.axes
     assert packed.nearness == 0.0
@@ -96,7 +96,7 @@ def path_flux(shot: Shot, j: int, i: int, batches: int, seed: int = 0) -> tuple[
     if not known.any():
         known = _passed(light_at, low, size, np.ones((FINER * CELLS, FINER * CELLS), dtype=bool), rng)
     while 0 < known.sum() < FEW and len(known) < FINEST:
-        # so little of the front that smaller cells fit it better
+        # the path passes a small part of the front: use smaller cells
         known = _passed(light_at, low, size, np.kron(known, np.ones((FINER, FINER), dtype=bool)), rng)
     side = len(known)
     fine = int(np.clip(np.sqrt(POINTS / max(known.sum(), 1)), 1, 64))
@@ -114,10 +114,10 @@ def path_flux(shot: Shot, j: int, i: int, batches: int, seed: int = 0) -> tuple[
 
 
 def _passed(light_at, low, size, where, rng):
-    """Find those of some cells of the front through which light comes, and their neighbours, shape (side, side).
+    """Find the cells that light passes, and their neighbours, shape (side, side).
 
-    What is found is followed outwards until all around it is dark: a spot of a few cells that one ray a cell half
-    misses would otherwise be known in part only, and nothing would tell so.
+    Known cells are extended outwards until all cells around them are dark. Otherwise a spot of a few cells, half missed
+    by one ray per cell, would be known only in part without any sign of it.
     """
     side = len(where)
     met, tried, wanted = (np.zeros((side, side), dtype=bool) for _ in range(3))

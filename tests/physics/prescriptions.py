@@ -1,4 +1,4 @@
-"""Lenses typed in by hand for the tests, so that a slip in a shipped lens file cannot hide itself.
+"""Lenses typed separately for the tests, so that an error in a shipped lens file is detected.
 
 Rows are (radius, thickness, n_d behind, semi-diameter); radius 0 is flat, "stop" the stop.
 """
@@ -11,7 +11,7 @@ from oracle import OracleRow, System, focused, stopped
 
 Table = list[tuple[Any, float, float, float]]
 
-# Van Acoleyen table 2.1 (US 2,645,156). The table has no diameters: these suit f/4.5 and 20 degrees.
+# Van Acoleyen table 2.1 (US 2,645,156). The table gives no diameters: these suit f/4.5 and 20 degrees.
 HELIAR: Table = [
     (30.810, 7.700, 1.652, 14.0),
     (-89.350, 1.850, 1.603, 14.0),
@@ -24,7 +24,7 @@ HELIAR: Table = [
     (-52.990, 81.857, 1.0, 12.0),
 ]
 
-# Walch figure 4.3 (US 2,854,889); the indices are the catalogue's for LAK9, LLF7, SF7.
+# Walch figure 4.3 (US 2,854,889); indices of LAK9, LLF7, SF7 from the catalogue.
 TESSAR: Table = [
     (42.970, 9.8, 1.69100, 19.2),
     (-115.33, 2.1, 1.54883, 19.2),
@@ -36,7 +36,7 @@ TESSAR: Table = [
     (-48.910, 79.831, 1.0, 16.5),
 ]
 
-# Van Acoleyen table A.1 (US 5,576,890). No diameters in the table: chosen for f/2.8 and 30 degrees, edges kept apart.
+# Van Acoleyen table A.1 (US 5,576,890). The table gives no diameters: chosen for f/2.8 and 30 degrees, edges apart.
 CANON: Table = [
     (684.66, 2.62, 1.805, 38.0),
     (-1055.76, 0.20, 1.0, 37.5),
@@ -68,7 +68,7 @@ CANON: Table = [
     (-84.63, 80.00, 1.0, 17.5),
 ]
 
-# Zeiss Biotar 50/1.4 (US 1,786,916); the corpus file states diameters.
+# Zeiss Biotar 50/1.4 (US 1,786,916); diameters from the corpus file.
 BIOTAR: Table = [
     (41.8, 5.375, 1.64238, 18.04),
     (160.5, 0.825, 1.0, 18.04),
@@ -83,7 +83,7 @@ BIOTAR: Table = [
     (-60.0, 32.66, 1.0, 14.35),
 ]
 
-# Leica Super-Angulon-R 21/4 (US 3,512,874), a retrofocus wide angle; diameters in the corpus file.
+# Leica Super-Angulon-R 21/4 (US 3,512,874), a retrofocus wide angle; diameters from the corpus file.
 SUPER_ANGULON: Table = [
     (59.9151, 5.8128, 1.52736, 25.39),
     (186.3645, 0.0966, 1.0, 25.39),
@@ -106,7 +106,7 @@ SUPER_ANGULON: Table = [
     (-20.5317, 36.5232, 1.0, 6.68),
 ]
 
-# Cooke triplet 50 mm with the stop on a row of its own.
+# Cooke triplet 50 mm whose stop is a separate row.
 TRIPLET: Table = [
     (22.01359, 3.25896, 1.62041, 9.5),
     (-435.76044, 6.00755, 1.0, 9.0),
@@ -124,13 +124,13 @@ FIVE: dict[str, tuple[Table, float]] = {
     "biotar": (BIOTAR, 1.4),
     "canon": (CANON, 2.8),
 }
-"""The five lenses of the comparison and their f-numbers; a sixth, SUPER_ANGULON, is at hand."""
+"""The five lenses of the comparison and their f-numbers; SUPER_ANGULON is an optional sixth."""
 
 HELIAR_CENTERS_NM = (430.0, 370.0, 510.0, 600.0, 310.0, 460.0, 550.0, 580.0, 650.0)
 
 
 def system(table: Table, f_number: float) -> System:
-    """Return the oracle's view of a table, sensor at the paraxial focus."""
+    """Return a table as the oracle's system, with the sensor at the paraxial focus."""
     rows, front = [], 1.0
     for radius, thickness, n, h in table:
         if radius == "stop":
@@ -142,7 +142,7 @@ def system(table: Table, f_number: float) -> System:
 
 
 def lens(table: Table, f_number: float, name: str = "typed", coatings: Any = None) -> Any:
-    """Return the program's view of a table: a `flarewright.model.Lens` whose glasses have no dispersion."""
+    """Return a table as a `flarewright.model.Lens` whose glasses have no dispersion."""
     from flarewright.model import Dispersion, Lens, Medium, Stop, Surface
 
     rows: list[Any] = []
@@ -156,3 +156,17 @@ def lens(table: Table, f_number: float, name: str = "typed", coatings: Any = Non
         curvature = 0.0 if radius == 0 else 1.0 / radius
         rows.append(Surface(curvature=curvature, thickness=thickness, medium=medium, semi_diameter=h, coating=coating))
     return Lens(name=name, f_number=f_number, rows=tuple(rows))
+
+
+def ghost_table_of(
+    a_lens: Any, field_deg: Any, *, f_number: float | None = None, coating: Any = None, threads: int | None = None,
+    **query: Any,
+) -> Any:  # fmt: skip
+    """Return the `ghost_table` of a lens with its own coatings, wide open, unless given; `query` as in `GhostQuery`."""
+    from flarewright.model import AsLens
+    from flarewright.optics.lens.paraxial import first_order
+    from flarewright.optics.rays.ghost_table import GhostQuery, ghost_table, pack_for_query
+
+    asked = GhostQuery(field_deg, **query)
+    packed = pack_for_query(a_lens, first_order(a_lens, f_number), AsLens() if coating is None else coating, asked)
+    return ghost_table(a_lens, packed, asked, threads=threads)

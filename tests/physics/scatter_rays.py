@@ -1,11 +1,11 @@
-"""Plain Monte Carlo of single scatter in NumPy: spheres, bare glass, a round stop. It shares no code with the pass."""
+"""Plain Monte Carlo of single scatter in NumPy: spheres, bare glass, a round stop. Shares no code with the pass."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from flarewright.model import Lens, Stop
-from flarewright.optics.paraxial import gap_indices, vertex_positions
+from flarewright.optics.lens.paraxial import gap_indices, vertex_positions
 
 SMALLEST = 1e-6
 
@@ -15,7 +15,7 @@ def unit(v):
 
 
 def hit(o, d, z, c):
-    """Meet a sphere of curvature c whose vertex is at z; return point and normal (towards +z)."""
+    """Intersect a sphere of curvature c with its vertex at z; return point and normal (towards +z)."""
     p = o - np.array([0.0, 0.0, z])
     if c == 0.0:
         at = p - (p[:, 2] / d[:, 2])[:, None] * d
@@ -28,7 +28,7 @@ def hit(o, d, z, c):
 
 
 def refract(d, normal, n_in, n_out):
-    """Snell's law and the transmittance of bare glass, mean of s and p."""
+    """Return the refracted direction and the transmittance of bare glass, mean of s and p."""
     ci = (d * normal).sum(axis=1)
     ct = np.sqrt(1.0 - (n_in / n_out) ** 2 * (1.0 - ci**2))
     out = n_in / n_out * d + (ct - n_in / n_out * ci)[:, None] * normal
@@ -38,7 +38,7 @@ def refract(d, normal, n_in, n_out):
 
 
 def scatter(d, normal, n_out, density, rng):
-    """Draw a direction, log-uniform in |v|; return it and the weight that makes `density(v, d, new, normal)` of it."""
+    """Draw a direction, log-uniform in |v|; return it with its weight for `density(v, d, new, normal)`."""
     a = unit(np.cross(normal, np.where(np.abs(normal[:, :1]) < 0.5, [[1.0, 0, 0]], [[0, 1.0, 0]])))
     b = np.cross(normal, a)
     span = np.log(2.0 * n_out / SMALLEST)
@@ -60,29 +60,29 @@ def scattered_flux(
     Parameters
     ----------
     lens : Lens
-        Of spheres, bare.
+        With bare spheres.
     order : FirstOrder
     tilt, axes
-        From `optics.bundle.incidence`.
+        From `optics.rays.bundle.incidence`.
     wavelength_nm : float
     density : callable
         density(row, n_in, n_out)(v, refracted, scattered, normal): share per area of v.
     count : int
-        Rays for each surface.
+        Rays per surface.
     seed : int
 
     Returns
     -------
     x, y, flux : ndarray
-        Where light lands in the upright picture and its flux per irradiance on the plane of the first vertex, one entry
-        a ray; 0 where it does not arrive.
+        Positions in the upright picture and flux per irradiance on the plane of the first vertex, one entry per ray; 0
+        for rays that do not arrive.
     made : ndarray, shape (K,)
         Flux that each surface scatters.
     """
     rng = np.random.default_rng(seed)
     n, z = gap_indices(lens, wavelength_nm), vertex_positions(lens)
     sensor = z[-1] + order.sensor_distance
-    # wide enough for all that can reach the first rim
+    # large enough for all rays that can reach the first surface
     half = 1.3 * lens.rows[0].semi_diameter if not isinstance(lens.rows[0], Stop) else 1.3 * lens.rows[1].semi_diameter
     direction = np.array([np.sin(tilt) * axes[1, 0], np.sin(tilt) * axes[1, 1], np.cos(tilt)])
     places, made = [], np.zeros(len(lens.rows))

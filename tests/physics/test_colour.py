@@ -1,8 +1,8 @@
 """Colour, channel by channel: few traced wavelengths against sixty-one exact lines over all visible light.
 
-Luminance cannot judge this: coatings that reflect blue and red change it by a hundredth where they change those
-channels twofold. Lines are traced one by one, each with the films' reflectance at its own wavelength, so they share
-with the colours of few wavelengths the lens and its films, and no mean over a band.
+Luminance is not enough: coatings that reflect blue and red change it by 1 % where they double those channels. Each line
+is traced separately with the films' reflectance at its wavelength. So the lines share only lens and films with the
+colours of few wavelengths, and no mean over a band.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import colour
 import numpy as np
 import pytest
 
-from flarewright.kernels.raster import sum_rows
+from flarewright.kernels.raster.polygons import sum_rows
 from flarewright.model import (
     D65,
     AsLens,
@@ -27,19 +27,20 @@ from flarewright.model import (
     QuarterWave,
     Standard,
 )
-from flarewright.optics.cie1931 import cie_1931
-from flarewright.optics.paths import ghost_paths
-from flarewright.optics.spectrum import VISIBLE_NM, spectral_power
-from flarewright.render.canvas import blank, merge
-from flarewright.render.ghosts_draft import draw_draft
-from flarewright.render.ghosts_final import draw_final, find_final
-from flarewright.render.opening import make_opening
-from flarewright.render.prepare import settle
+from flarewright.optics.colour.cie1931 import cie_1931
+from flarewright.optics.colour.spectrum import VISIBLE_NM, spectral_power
+from flarewright.optics.lens.paths import ghost_paths
+from flarewright.render.ghosts.paraxial_ghosts import draw_draft
+from flarewright.render.ghosts.traced_ghosts import draw_final, find_final
+from flarewright.render.image.canvas import blank, merge
+from flarewright.render.reference import estimator
 from flarewright.render.render import render
-from flarewright.render.shots import make_shots
+from flarewright.render.scene.opening import make_opening
+from flarewright.render.scene.resolve import resolve_project
+from flarewright.render.scene.shots import make_shots
 
 LINES_NM = np.linspace(*VISIBLE_NM, 61)
-# of a ghost's largest channel, and of which ghosts: those above this part of the brightest
+# allowed error relative to a ghost's largest channel; least brightness of compared ghosts, relative to the brightest
 GHOST, FAINTEST = 0.02, 1e-3
 MEDIAN, WORST = 1.0, 3.0
 
@@ -59,10 +60,12 @@ MORE = {
 }
 ZOOM = {"nikon-28-75": ("nikon-28-75", Standard(name="modern-broadband"), (12.0, -6.0), 8.0)}
 SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in MORE]
+# one lens shows each property
+ONE_LENS = ["triplet", *(pytest.param(name, marks=pytest.mark.slow) for name in CASES if name != "triplet")]
 
 
 def at_lines(spectrum):
-    """Return a spectrum as lines, each of the power that the spectrum has there."""
+    """Return a spectrum as lines, each with the power of the spectrum there."""
     power = spectral_power(spectrum, LINES_NM)
     return Lines(lines=tuple(zip(LINES_NM.tolist(), power.tolist(), strict=True)))
 
@@ -82,7 +85,7 @@ def pictures(case, spectrum, wavelengths, mode="final", size=(96, 54), layers="g
 
 
 def off_by(case, spectrum, wavelengths, mode="final"):
-    """Return how far each ghost that counts is off, of its largest channel."""
+    """Return the error of each compared ghost, relative to its largest channel."""
     exact = pictures(case, at_lines(spectrum), len(LINES_NM), mode)
     found = pictures(case, spectrum, wavelengths, mode)
     sums = {name: pixels.sum(axis=(0, 1)) for name, pixels in exact.items() if name.startswith("ghost.")}
@@ -100,7 +103,7 @@ def test_the_range_holds_the_light(spectrum):
     assert (xyz[~within].sum(axis=0) < 2e-5 * xyz.sum(axis=0)).all()
 
 
-@pytest.mark.parametrize("case", [*CASES, *SLOW])
+@pytest.mark.parametrize("case", [*ONE_LENS, *SLOW])
 def test_every_ghost_has_its_colour(case):
     wrong = {name: round(off, 3) for name, off in off_by(case, D65(), 7).items() if off > 1.05 * GHOST}
     assert wrong == {}
@@ -108,13 +111,17 @@ def test_every_ghost_has_its_colour(case):
 
 @pytest.mark.parametrize(
     ("spectrum", "wavelengths"),
-    [(BlackBody(temperature_k=3200.0), 7), (BlackBody(temperature_k=9000.0), 7), (D65(), 5)],
+    [
+        (BlackBody(temperature_k=3200.0), 7),
+        pytest.param(BlackBody(temperature_k=9000.0), 7, marks=pytest.mark.slow),
+        pytest.param(D65(), 5, marks=pytest.mark.slow),
+    ],
 )
 def test_whatever_the_light(spectrum, wavelengths):
     assert max(off_by("triplet", spectrum, wavelengths).values()) < GHOST * 7.0 / wavelengths
 
 
-@pytest.mark.parametrize("case", [*CASES, "takumar"])
+@pytest.mark.parametrize("case", [*ONE_LENS, pytest.param("takumar", marks=pytest.mark.slow)])
 def test_drafts_have_it_too(case):
     off = list(off_by(case, D65(), 3, mode="draft").values())
     assert np.median(off) < 0.7 * GHOST
@@ -122,22 +129,48 @@ def test_drafts_have_it_too(case):
 
 
 BROADBAND = Standard(name="modern-broadband")
-# ghosts whose light passes the rims, or lands in the picture, at one end of the spectrum alone
+# ghosts whose light passes all edges, or lands in the picture, at one end of the spectrum only
 STEEP = {
     "sliver": ("nikon-28-75", BROADBAND, (12.0, -6.0), 8.0, "2-0", "final"),
     "sliver of bare glass": ("nikon-28-75", AsLens(), (12.0, -6.0), 8.0, "2-0", "final"),
     "red end": ("nikon-28-75", BROADBAND, (12.0, -6.0), 8.0, "9-1", "final"),
+    "throughput that falls beyond the first traced wavelength": (
+        "canon-70-200",
+        BROADBAND,
+        (6.0, 3.0),
+        5.6,
+        "33-22",
+        "final",
+    ),
+    "thinnest sliver": ("canon-70-200", BROADBAND, (6.0, 3.0), 5.6, "19-12", "final"),
     "draft": ("nikon-28-75", BROADBAND, (12.0, -6.0), 8.0, "11-2", "draft"),
     "draft of bare glass": ("takumar-50-f1.4", AsLens(), (-9.0, 5.0), 4.0, "13-5", "draft"),
+    "draft beyond the first traced wavelength": ("canon-70-200", BROADBAND, (6.0, 3.0), 5.6, "23-6", "draft"),
     "totally reflected draft": ("canon-70-200", BROADBAND, (6.0, 3.0), 5.6, "16-2", "draft"),
+    "draft that bends at one end": (
+        "nikkor-85-f1.4",
+        QuarterWave(center_wavelength_nm=550.0),
+        (5.0, 2.0),
+        4.0,
+        "13-4",
+        "draft",
+    ),
+    "abrupt end of a draft": (
+        "nikkor-85-f1.4",
+        QuarterWave(center_wavelength_nm=550.0),
+        (5.0, 2.0),
+        4.0,
+        "11-1",
+        "draft",
+    ),
 }
-# nine lines, of which none is traced when there are seven wavelengths
+# nine lines, none of which is among seven traced wavelengths
 FEW_LINES = Lines(lines=tuple((nm, 1.0) for nm in (367.0, 383.0, 402.0, 436.0, 480.0, 546.0, 578.0, 640.0, 700.0)))
 
 
 def ghost_of(case, spectrum, wavelengths, **quality):
-    """Draw one ghost and sum it."""
-    lens, coating, field, f_number, name, mode = STEEP[case]
+    """Draw one ghost and return its sum."""
+    lens, coating, field, f_number, name, mode = {**STEEP, **HIDDEN}[case]
     project = Project(
         lens=lens,
         coating=coating if isinstance(coating, AsLens) else Everywhere(coating=coating),
@@ -146,7 +179,7 @@ def ghost_of(case, spectrum, wavelengths, **quality):
         camera=Camera(size_px=(96, 54)),
         quality=Quality(mode=mode, wavelengths=wavelengths, ringing="off", **quality),
     )
-    settled = settle(project)
+    settled = resolve_project(project)
     (shot,) = make_shots(settled, make_opening(settled, None))
     (path,) = (path for path in ghost_paths(settled.lens) if path.name == name)
     if mode == "draft":
@@ -162,19 +195,56 @@ def ghost_of(case, spectrum, wavelengths, **quality):
 
 def steep_error(case, spectrum, exact_spectrum, **quality):
     exact = ghost_of(case, exact_spectrum, len(LINES_NM))
-    found = ghost_of(case, spectrum, 3 if STEEP[case][-1] == "draft" else 7, **quality)
+    found = ghost_of(case, spectrum, 3 if {**STEEP, **HIDDEN}[case][-1] == "draft" else 7, **quality)
     return np.abs(found - exact).max() / np.abs(exact).max()
 
 
-@pytest.mark.parametrize("case", STEEP)
+# drafts whose light ends within the spectrum, and a band around the end
+HIDDEN = {
+    "hidden draft": ("canon-70-200", BROADBAND, (6.0, 3.0), 5.6, "15-5", "draft"),
+    "short draft": ("canon-70-200", BROADBAND, (6.0, 3.0), 5.6, "19-12", "draft"),
+    "draft hidden up to the red end": ("nikkor-85-f1.4", BROADBAND, (7.0, -3.0), 2.8, "18-14", "draft"),
+}
+WINDOWS_NM = {"hidden draft": (360.0, 410.0), "short draft": (434.0, 459.0)}
+
+
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=pytest.mark.slow if case == "totally reflected draft" else ()) for case in STEEP]
+)
 def test_a_ghost_that_passes_at_one_end_of_the_spectrum_has_its_colour(case):
     assert steep_error(case, D65(), at_lines(D65())) < GHOST
 
 
-@pytest.mark.parametrize("case", ["sliver", "draft"])
-@pytest.mark.parametrize("spectrum", [BlackBody(temperature_k=3200.0), BlackBody(temperature_k=9000.0)])
+@pytest.mark.parametrize("case", ["hidden draft", pytest.param("short draft", marks=pytest.mark.slow)])
+def test_a_draft_has_its_light_up_to_where_it_ends(case):
+    """Lines that all lie where the ghost has light resolve the end; over the whole range, 60 and 61 differ by 14 %."""
+    low, high = WINDOWS_NM[case]
+    nm = low + (high - low) * (np.arange(80) + 0.5) / 80
+    fine_nm = np.arange(360.0, 830.0, 0.05)
+    light = cie_1931(fine_nm)[:, 1] * spectral_power(D65(), fine_nm)
+    share = light[(low <= fine_nm) & (fine_nm < high)].sum() / light.sum()
+    lines = Lines(lines=tuple(zip(nm.tolist(), spectral_power(D65(), nm).tolist(), strict=True)))
+    exact = share * ghost_of(case, lines, len(nm))
+    assert np.abs(ghost_of(case, D65(), 3) - exact).max() < GHOST * np.abs(exact).max()
+
+
+LAMP = BlackBody(temperature_k=2856.0)
+
+
+@pytest.mark.parametrize(
+    ("case", "spectrum"),
+    [
+        ("sliver", BlackBody(temperature_k=3200.0)),
+        ("sliver", BlackBody(temperature_k=9000.0)),
+        ("draft", BlackBody(temperature_k=3200.0)),
+        ("draft", BlackBody(temperature_k=9000.0)),
+        ("draft that bends at one end", LAMP),
+        ("draft hidden up to the red end", LAMP),
+    ],
+)
 def test_whatever_lights_it(case, spectrum):
-    assert steep_error(case, spectrum, at_lines(spectrum)) < GHOST
+    # 61 lines leave out the light beyond 780 nm
+    assert steep_error(case, spectrum, at_lines(spectrum)) < (1.5 if spectrum is LAMP else 1.0) * GHOST
 
 
 @pytest.mark.parametrize("case", ["sliver", "draft", "draft of bare glass"])
@@ -198,7 +268,7 @@ def lightness(pixels):
     return colour.XYZ_to_Lab(xyz, colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"])
 
 
-@pytest.mark.parametrize("case", ["triplet", "heliar", *SLOW])
+@pytest.mark.parametrize("case", ["triplet", pytest.param("heliar", marks=pytest.mark.slow), *SLOW])
 def test_the_whole_picture_looks_alike(case):
     """CIEDE2000 of every pixel, exposed so that its brightest parts are nearly white."""
     size = (240, 135)
@@ -211,7 +281,7 @@ def test_the_whole_picture_looks_alike(case):
 
 
 def z_of(case, seeds, samples):
-    """Compare the reference's ghosts with the lines', each channel in its own standard errors."""
+    """Compare the reference's ghosts with the lines, each channel in standard errors."""
     size = (48, 27)
     exact = pictures(case, at_lines(D65()), len(LINES_NM), size=size, layers="passes")["ghosts"].sum(axis=(0, 1))
     runs = [
@@ -220,13 +290,15 @@ def z_of(case, seeds, samples):
     ]
     sums = np.array([run.sum(axis=(0, 1)) for run in runs])
     error = sums.std(axis=0, ddof=1) / np.sqrt(seeds)
-    # a test that sees nothing proves nothing
+    # the test must be sharp enough
     assert (error < 0.05 * np.abs(exact).max()).all()
     return (sums.mean(axis=0) - exact) / error
 
 
-def test_the_reference_agrees_in_every_channel():
-    assert np.abs(z_of("triplet", 5, 2 * 128**2)).max() < 5.0
+@pytest.mark.parametrize("side", [96, pytest.param(128, marks=pytest.mark.slow)])
+def test_the_reference_agrees_in_every_channel(side, monkeypatch):
+    monkeypatch.setattr(estimator, "SIDE", side)
+    assert np.abs(z_of("triplet", 5, 2 * side**2)).max() < 5.0
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""What an image or a depth plate hides of a light: the light that is left, and where."""
+"""Holdouts: the part of a light that an image or a depth plate leaves visible, and its position."""
 
 import numpy as np
 import OpenEXR
@@ -7,24 +7,25 @@ from judge import judge, probabilities
 from PIL import Image
 
 from flarewright.errors import ProjectError
-from flarewright.io.project_file import project_text, read_project
-from flarewright.io.reference_state import read_state
+from flarewright.io.project.project_file import project_text, read_project
+from flarewright.io.render_state.reference_state import read_state
 from flarewright.model import Camera, Holdout, Light, Lines, Output, Polygon, Project, Quality, Rectangle
-from flarewright.optics.border import brightness, centroid, closed, content, mapped
-from flarewright.optics.color import luminance_weights
-from flarewright.optics.holdout import behind, hidden_at
-from flarewright.render import ledger, montecarlo, reference
-from flarewright.render.opening import make_opening
-from flarewright.render.prepare import settle
-from flarewright.render.reference import ReferenceRun
+from flarewright.optics.colour.rgb import luminance_weights
+from flarewright.optics.pupil.occlusion import hidden_part, visible_shape
+from flarewright.optics.pupil.polygon import centroid, closed, content, mapped, shape_brightness
+from flarewright.render.ghosts.extent_blur import extent_coverage
+from flarewright.render.reference import batches as batch_module
+from flarewright.render.reference import energy_ledger, estimator
+from flarewright.render.reference.estimator import ReferenceRun
 from flarewright.render.render import BLACK, HIDDEN, render
-from flarewright.render.shots import make_shots
-from flarewright.render.spread import covered
+from flarewright.render.scene.opening import make_opening
+from flarewright.render.scene.resolve import resolve_project
+from flarewright.render.scene.shots import make_shots
 
 D_LINE = Lines(lines=((587.56, 1.0),))
 SIZE = (120, 80)
 FINE = 8
-# half of the ghosts show what is hidden of a light
+# half of the ghosts suffice to test holdouts
 SOME = {"paths": "same-side"}
 QUALITIES = [SOME, pytest.param({}, marks=pytest.mark.slow)]
 DISC = Light(field_deg=(6.0, 4.0), spectrum=D_LINE, diameter_deg=3.0)
@@ -46,7 +47,7 @@ RENDERED = {}
 
 
 def rendered(made):
-    """Render a project once: files of holdouts are written once, so it has one picture."""
+    """Render a project, cached: the files of holdouts are written once per test."""
     key = made.model_dump_json()
     if key not in RENDERED:
         RENDERED[key] = render(made)
@@ -60,7 +61,7 @@ def picture(made, name):
 
 @pytest.fixture(scope="module")
 def whole():
-    """The disc in full: its direct image, and column and row of its middle."""
+    """Return the full disc: its direct image, and column and row of its centre."""
     full = project(quality=SOME)
     x, y = rendered(full).summary["lights"][0]["direct_position_mm"]
     middle = (SIZE[0] / 2 + x * SIZE[0] / 36.0, SIZE[1] / 2 - y * SIZE[0] / 36.0)
@@ -68,7 +69,7 @@ def whole():
 
 
 def matte(path, column):
-    """Black left of a column of the picture, with an edge between pixels."""
+    """Write an image that is black left of a column of the picture, with the edge between pixels."""
     at = np.arange(SIZE[0] * FINE) / FINE
     grey = np.round(255.0 * np.clip((at + 1.0 / FINE - column) * FINE, 0.0, 1.0)).astype(np.uint8)
     Image.fromarray(np.tile(grey, (SIZE[1] * FINE, 1))).save(path)
@@ -83,7 +84,7 @@ def depth_plate(path, depth, name="Z"):
 
 
 # ---------------------------------------------------------------------------------------------------------------------
-# The light that is left
+# The remaining light
 
 
 @pytest.mark.parametrize("quality", QUALITIES)
@@ -97,12 +98,12 @@ def test_two_halves_of_a_disc_are_the_disc(mode, quality, whole, tmp_path):
     made = [{name: picture(half, name) for name in ("ghosts", "starburst")} for half in held]
     for half in made:
         assert half["starburst"].sum() == pytest.approx(0.5 * whole[0].sum(), rel=0.01)
-        # the ghosts of the two halves differ by which rims they meet
+        # different edges cut the ghosts of the two halves
         assert half["ghosts"].sum() == pytest.approx(0.5 * full.sum(), rel=0.1)
     both = made[0]["ghosts"] + made[1]["ghosts"]
     assert both.sum() == pytest.approx(full.sum(), rel=1e-3)
     assert np.abs(both - full).sum() < 0.02 * full.sum()
-    # the black half is dark, the other as bright as it was
+    # the black half is dark, the other unchanged
     column = int(whole[1][0])
     assert made[0]["starburst"][:, : column - 2].sum() < 0.02 * whole[0].sum()
     assert np.abs(made[0]["starburst"][:, column + 3 :] / whole[0][:, column + 3 :]).max() < 1.01
@@ -116,7 +117,7 @@ def test_what_is_seen_of_a_rectangle_is_a_smaller_one(quality, tmp_path):
     hidden = project(window, held, quality=quality)
     middle = np.degrees(np.arctan(np.tan(np.radians((4.0, 8.0))).mean())) - 6.0
     right = Polygon(corners_deg=((middle, -1.0), (2.0, -1.0), (2.0, 1.0), (middle, 1.0)))
-    shots = make_shots(settle(hidden), make_opening(settle(hidden), None))
+    shots = make_shots(resolve_project(hidden), make_opening(resolve_project(hidden), None))
     left = sum(shot.share for shot in shots)
     assert left == pytest.approx(0.5, abs=0.005)
     seen = project(Light(field_deg=(6.0, 4.0), spectrum=D_LINE, shape=right, intensity=left), quality=quality)
@@ -128,12 +129,12 @@ def test_what_is_seen_of_a_rectangle_is_a_smaller_one(quality, tmp_path):
 
 @pytest.mark.parametrize("effort", ["small", pytest.param("whole", marks=pytest.mark.slow)])
 def test_the_reference_sees_the_same(effort, whole, tmp_path, monkeypatch):
-    """Random directions of what is left, by z-test; and what enters is what is seen."""
+    """Random directions of the visible part, by z-test; the entering light is that of the visible part."""
     layers, batches = "ghosts", 24
     if effort == "small":
         # each direction costs as much as hundreds of rays
-        monkeypatch.setattr(montecarlo, "AIMS", 4)
-        monkeypatch.setattr(ledger, "SIDE", 8)
+        monkeypatch.setattr(batch_module, "AIM_SIDE", 4)
+        monkeypatch.setattr(energy_ledger, "SIDE", 8)
         layers, batches = "passes", 12
     held = Holdout(image=matte(tmp_path / "m.png", whole[1][0] + 1.0))
     quality = {"source_step_deg": 1.5}
@@ -144,16 +145,16 @@ def test_the_reference_sees_the_same(effort, whole, tmp_path, monkeypatch):
     assert worst > 1e-4
     entered = []
     for hiding in (held, None):
-        settled = settle(project(DISC, hiding))
+        settled = resolve_project(project(DISC, hiding))
         shots = make_shots(settled, make_opening(settled, None))
-        entered.append((ledger.trace_ledger(shots, 0).entered_mm2, sum(shot.share for shot in shots)))
+        entered.append((energy_ledger.trace_ledger(shots, 0).entered_mm2, sum(shot.share for shot in shots)))
     assert entered[0][0] / entered[1][0] == pytest.approx(entered[0][1], rel=0.01)
     assert entered[0][1] == pytest.approx(0.427, abs=0.01)
 
 
 def test_a_state_of_another_holdout_is_refused(tmp_path, monkeypatch):
-    """By what it hides, not by its name."""
-    monkeypatch.setattr(reference, "SIDE", 16)
+    """The state compares the effect of a holdout, not its file name."""
+    monkeypatch.setattr(estimator, "SIDE", 16)
     file, state = tmp_path / "m.png", tmp_path / "a.state.npz"
     quality = {"reference_samples": 1, "reference_from": "light"}
     made = project(DISC, Holdout(image=matte(file, 94.0)), "reference", quality=quality)
@@ -185,22 +186,22 @@ def test_a_hidden_light_gives_nothing(tmp_path):
             assert not any(layer.pixels.any() for layer in found.layers)
             assert found.summary["lights"][0]["visible"] == 0.0
             assert sum(found.summary["lights"][0]["direct_throughput_mm2"]) == 0.0
-            # nobody shall look for the fault in the lens
+            # a remark names the holdout as the cause
             assert HIDDEN in found.remarks
             assert BLACK not in found.remarks
-    # a light of its own beside it is not
+    # a second light beside it is not hidden
     other = DISC.replace(field_deg=(-6.0, 2.0), diameter_deg=0.0)
     both = Project(**{**dict(project()), "lights": (DISC.replace(holdout=black), other)})
     assert picture(both, "ghosts").sum() == pytest.approx(picture(project(other), "ghosts").sum(), rel=1e-6)
 
 
 # ---------------------------------------------------------------------------------------------------------------------
-# Where
+# Position
 
 
 @pytest.mark.parametrize("lens", ["flektogon-35", "heliar-tronnier"])
 def test_a_plate_lies_in_the_picture(lens, tmp_path):
-    """A point is hidden by the pixels on which its direct image falls, distortion and all, and by no others."""
+    """A point light is hidden exactly by the pixels of its direct image, with distortion."""
     made = project(Light(field_deg=(8.0, -5.0), spectrum=D_LINE)).replace(lens=lens)
     x, y = render(made).summary["lights"][0]["direct_position_mm"]
     zoom = SIZE[0] * FINE / 36.0
@@ -209,7 +210,7 @@ def test_a_plate_lies_in_the_picture(lens, tmp_path):
     spot[row - 1 : row + 2, column - 1 : column + 2] = 255
     Image.fromarray(spot).save(tmp_path / "spot.png")
     for invert, seen in ((False, 1.0), (True, 0.0)):
-        settled = settle(made.replace(holdout=Holdout(image=str(tmp_path / "spot.png"), invert=invert)))
+        settled = resolve_project(made.replace(holdout=Holdout(image=str(tmp_path / "spot.png"), invert=invert)))
         assert make_shots(settled, make_opening(settled, None))[0].share == pytest.approx(seen, abs=1e-6)
 
 
@@ -218,18 +219,18 @@ def test_outside_the_plate_nothing_is_hidden(tmp_path):
     Image.fromarray(np.zeros((SIZE[1], SIZE[0]), dtype=np.uint8)).save(tmp_path / "black.png")
     for overscan, left in ((1.0, 1.0), (1.6, 0.0)):
         held = Holdout(image=str(tmp_path / "black.png"), overscan=overscan)
-        settled = settle(project(beside, held))
+        settled = resolve_project(project(beside, held))
         assert sum(shot.share for shot in make_shots(settled, make_opening(settled, None))) == pytest.approx(left)
 
 
 def test_a_depth_plate_hides_what_is_behind(tmp_path):
-    """Metres; a lamp at 4 m, the sun, and pixels where nothing is."""
+    """In metres: a lamp at 4 m, the sun, and pixels without an object."""
     lamp = DISC.replace(distance=4000.0, diameter_deg=0.0)
     nothing = [(far, 1.0, 1.0) for far in (0.0, np.inf, 65504.0)]
     for depth, lamp_seen, sun_seen in ((3.9, 0.0, 0.0), (4.1, 1.0, 0.0), *nothing):
         file = depth_plate(tmp_path / "d.exr", np.full((SIZE[1], SIZE[0]), depth))
         for light, seen in ((lamp, lamp_seen), (lamp.replace(distance=None), sun_seen)):
-            settled = settle(project(light, Holdout(depth=file)))
+            settled = resolve_project(project(light, Holdout(depth=file)))
             assert sum(shot.share for shot in make_shots(settled, make_opening(settled, None))) == seen
         (tmp_path / "d.exr").unlink()
 
@@ -249,14 +250,14 @@ OUTLINES = {
 @pytest.mark.parametrize("name", OUTLINES)
 @pytest.mark.parametrize("kind", ["grey", "black and white"])
 def test_a_cut_shape_covers_pixels_as_the_image_lets_it(name, kind):
-    """Exact coverage of each pixel, pixel by pixel, and which points lie in it."""
+    """Exact coverage of each pixel, pixel by pixel, and the points inside."""
     rng = np.random.default_rng(5)
     hidden = rng.random((30, 40))
     hidden = hidden if kind == "grey" else np.round(hidden)
     border, margin = closed(OUTLINES[name]), 12
-    cut = behind(border, hidden)
+    cut = visible_shape(border, hidden)
     size = (30 + 2 * margin, 40 + 2 * margin)
-    whole, left = (covered(mapped(shape, np.eye(2), margin), size) for shape in (border, cut))
+    whole, left = (extent_coverage(mapped(shape, np.eye(2), margin), size) for shape in (border, cut))
     expected = whole * (1.0 - np.pad(hidden, margin))
     assert left == pytest.approx(expected, abs=1e-12)
     assert content(cut) == pytest.approx(abs(expected.sum()), rel=1e-12)
@@ -264,15 +265,15 @@ def test_a_cut_shape_covers_pixels_as_the_image_lets_it(name, kind):
     middle = np.array([(expected * at).sum() for at in (columns, rows)]) / expected.sum()
     assert centroid(cut) == pytest.approx(middle, abs=0.2)
     places = rng.random((500, 2)) * [40, 30]
-    seen = brightness(border, places) * (1.0 - hidden[places[:, 1].astype(int), places[:, 0].astype(int)])
-    assert brightness(cut, places) == pytest.approx(seen, abs=1e-12)
+    seen = shape_brightness(border, places) * (1.0 - hidden[places[:, 1].astype(int), places[:, 0].astype(int)])
+    assert shape_brightness(cut, places) == pytest.approx(seen, abs=1e-12)
 
 
 def test_fine_images_are_averaged():
-    """A chequered image of 400 pixels lets half of a shape through, evenly."""
+    """A chequered image of 400 pixels passes half of a shape, evenly."""
     chequered = np.indices((300, 400)).sum(axis=0) % 2.0
     border = closed(np.array([(0.0, 0.0), (400.0, 0.0), (400.0, 300.0), (0.0, 300.0)]))
-    cut = behind(border, chequered)
+    cut = visible_shape(border, chequered)
     assert content(cut) == pytest.approx(60_000.0, rel=1e-3)
     assert len(cut) < 70_000
     assert centroid(cut) == pytest.approx([200.0, 150.0], abs=0.1)
@@ -280,11 +281,11 @@ def test_fine_images_are_averaged():
 
 def test_all_nothing_and_between():
     border = closed(OUTLINES["disc"])
-    assert behind(border, np.zeros((30, 40))) is border
-    assert len(behind(border, np.ones((30, 40)))) == 0
+    assert visible_shape(border, np.zeros((30, 40))) is border
+    assert len(visible_shape(border, np.ones((30, 40)))) == 0
     ramp = np.tile(np.arange(40.0) / 40.0, (30, 1))
-    assert hidden_at(ramp, np.array([20.0, 11.3])) == pytest.approx(19.5 / 40.0)
-    assert hidden_at(ramp, np.array([60.0, 11.3])) == 0.0
+    assert hidden_part(ramp, np.array([20.0, 11.3])) == pytest.approx(19.5 / 40.0)
+    assert hidden_part(ramp, np.array([60.0, 11.3])) == 0.0
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -333,7 +334,7 @@ def test_bad_holdouts(holdout, words, tmp_path):
     (tmp_path / "p.toml").write_text(f"{head}{holdout}\n")
 
     def shots():
-        settled = settle(read_project(tmp_path / "p.toml"))
+        settled = resolve_project(read_project(tmp_path / "p.toml"))
         return make_shots(settled, make_opening(settled, None))
 
     with pytest.raises(ProjectError, match=words):
@@ -341,10 +342,10 @@ def test_bad_holdouts(holdout, words, tmp_path):
 
 
 def test_one_channel_by_any_name(tmp_path):
-    """Alpha alone as a matte; a depth called as its renderer likes."""
+    """A matte with alpha only; depth channels with the names of various renderers."""
     for name, key in (("A", "image"), ("V", "image"), ("depth", "depth"), ("mist", "depth")):
         file = depth_plate(tmp_path / f"{name}.exr", np.full((SIZE[1], SIZE[0]), 0.25), name)
-        settled = settle(project(DISC, Holdout(**{key: file})))
+        settled = resolve_project(project(DISC, Holdout(**{key: file})))
         shots = make_shots(settled, make_opening(settled, None))
         assert sum(shot.share for shot in shots) == pytest.approx(0.25 if key == "image" else 0.0)
 
@@ -358,6 +359,6 @@ def test_a_cropped_plate_lies_where_its_window_is(tmp_path):
     file = OpenEXR.File(header, {"A": np.ones((40, 60), dtype=np.float32)})
     file.write(str(tmp_path / "a.exr"))
     for field, seen in (((6.0, 4.0), 1.0), ((-6.0, 4.0), 0.0), ((6.0, -4.0), 0.0)):
-        settled = settle(project(DISC.replace(field_deg=field), Holdout(image=str(tmp_path / "a.exr"))))
+        settled = resolve_project(project(DISC.replace(field_deg=field), Holdout(image=str(tmp_path / "a.exr"))))
         shots = make_shots(settled, make_opening(settled, None))
         assert sum(shot.share for shot in shots) == pytest.approx(seen)

@@ -1,6 +1,6 @@
-"""What other flare programs get wrong (physics page, last section): one test a mistake, named after it.
+"""Errors of other flare programs (last section of the physics page): one test per error, named after it.
 
-Each test is written so that the mistake would fail it by far more than its tolerance.
+Each error would exceed the tolerance of its test many times.
 """
 
 from __future__ import annotations
@@ -10,12 +10,13 @@ from functools import cache
 import numpy as np
 import pytest
 from oracle import estimate
-from prescriptions import HELIAR, TRIPLET, lens, system
+from prescriptions import HELIAR, TRIPLET, ghost_table_of, lens, system
+from sensor_rays import trace_rays
 
-from flarewright.io.dotlens import read_dotlens
-from flarewright.kernels.bundle import draw_bundle, node_densities
-from flarewright.kernels.raster import blank_plane, to_pixels
-from flarewright.kernels.trace import ALIVE, STOP_X, WEIGHT, X, Y
+from flarewright.io.lens.dotlens import read_dotlens
+from flarewright.kernels.raster.bundle import draw_bundle, node_densities
+from flarewright.kernels.raster.polygons import blank_plane, to_pixels
+from flarewright.kernels.tracing.sequential import ALIVE, STOP_X, WEIGHT, X, Y
 from flarewright.model import (
     Bare,
     Camera,
@@ -32,29 +33,27 @@ from flarewright.model import (
     QuarterWave,
     Stop,
 )
-from flarewright.optics.coatings import film_stack, stack_reflectance
-from flarewright.optics.ghosts import ghost_table
-from flarewright.optics.mask_levels import mask_levels
-from flarewright.optics.pack import pack_lens
-from flarewright.optics.paraxial import D_LINE_NM, first_order
-from flarewright.optics.paths import direct_path, ghost_path, ghost_paths
-from flarewright.optics.repair import repair
-from flarewright.optics.spectrum import band_weights
-from flarewright.optics.trace import trace_rays
-from flarewright.render.compose import beauty
-from flarewright.render.display import srgb_oetf, view
-from flarewright.render.prepare import load_lens
+from flarewright.optics.coatings.thin_film import film_stack, stack_reflectance
+from flarewright.optics.colour.spectrum import band_weights
+from flarewright.optics.lens.paraxial import D_LINE_NM, first_order
+from flarewright.optics.lens.paths import direct_path, ghost_path, ghost_paths
+from flarewright.optics.lens_import.patent_repair import repair
+from flarewright.optics.pupil.mask_levels import mask_levels
+from flarewright.optics.rays.pack import pack_lens
+from flarewright.render.image.compose import beauty
+from flarewright.render.image.display import srgb_oetf, view
 from flarewright.render.render import render
+from flarewright.render.scene.resolve import load_lens
 
 FIELD = (8.0, 5.0)
-# rings take a hundred times as long as the rays
+# rings take a hundred times as long as rays
 RINGING = ["off", pytest.param("collins", marks=pytest.mark.slow)]
 
 
 @cache
 def heliar_table():
-    """Return the bare Heliar's ghosts at f/8, which is cheaper than wide open and is read by several tests."""
-    return ghost_table(lens(HELIAR, 8.0), FIELD)
+    """Return the ghosts of the bare Heliar at f/8, cheaper than wide open; several tests use them."""
+    return ghost_table_of(lens(HELIAR, 8.0), FIELD)
 
 
 def rows_of(table) -> dict:
@@ -71,7 +70,7 @@ def rendering(a_lens, field=FIELD, *, size=(64, 36), sensor=None, layers="passes
             lights=(light,),
             camera=Camera(size_px=size, sensor_mm=sensor),
             quality=Quality(**{k: v for k, v in parts.items() if k in Quality.model_fields}),
-            # single ghosts are looked at without a starburst beside them
+            # single ghosts are compared without a starburst
             output=Output(layers=layers, starburst=layers == "passes"),
         )
     )
@@ -82,17 +81,17 @@ def layer(result, name):
 
 
 def test_front_surface_skipped():
-    """Row 0 reflects: seven of the Heliar's ghosts end at it, and one of them is among its brightest."""
+    """Row 0 reflects: seven of the Heliar's ghosts end at it, one of them among the brightest."""
     table = heliar_table()
     at_front = [g for g in table.ghosts if g.second_reflection == 0]
     assert len(at_front) == 7
     assert sum(g.throughput_mm2 for g in at_front) > 0.1 * sum(g.throughput_mm2 for g in table.ghosts)
-    # and light pays for entering: the direct image carries T of the front surface as of all others
+    # the direct image carries T of the front surface as of all others
     front = lens(HELIAR, 8.0)
-    bare = ghost_table(front, (0.0, 0.0), paths="same-side").direct.throughput_mm2
+    bare = ghost_table_of(front, (0.0, 0.0), paths="same-side").direct.throughput_mm2
     perfect = front.rows[0].replace(coating=QuarterWave(center_wavelength_nm=D_LINE_NM, index="ideal"))
     coated = front.replace(rows=(perfect, *front.rows[1:]))
-    better = ghost_table(coated, (0.0, 0.0), paths="same-side").direct.throughput_mm2
+    better = ghost_table_of(coated, (0.0, 0.0), paths="same-side").direct.throughput_mm2
     r = ((1.652 - 1.0) / (1.652 + 1.0)) ** 2
     assert bare / better == pytest.approx(1.0 - r, abs=2e-3)
 
@@ -105,16 +104,16 @@ def test_stop_enumerated_as_a_mirror():
 
 
 def test_flat_surfaces_that_neither_refract_nor_reflect():
-    """The Heliar's row 6 is flat: its ghosts carry light, and a very weak curve in its place changes nothing."""
+    """The Heliar's row 6 is flat: its ghosts carry light, and a very weak curvature instead changes nothing."""
     flat = lens(HELIAR, 8.0)
     curved = flat.replace(rows=tuple(r.replace(curvature=1e-9) if k == 6 else r for k, r in enumerate(flat.rows)))
-    a, b = rows_of(heliar_table()), rows_of(ghost_table(curved, FIELD))
+    a, b = rows_of(heliar_table()), rows_of(ghost_table_of(curved, FIELD))
     assert sum(path[0] == 6 or path[1] == 6 for path in a) == 7
     for path in ((6, 4), (6, 0), (8, 6)):
         assert a[path].throughput_mm2 > 1e-3 * max(g.throughput_mm2 for g in a.values())
         assert b[path].throughput_mm2 == pytest.approx(a[path].throughput_mm2, rel=1e-5)
         assert b[path].rms_radius_mm == pytest.approx(a[path].rms_radius_mm, rel=1e-5)
-    # Snell at a plane: an oblique ray leaves the glass behind it bent
+    # Snell's law at a plane: an oblique ray is refracted
     packed = pack_lens(flat, first_order(flat), (None,) * 9, np.array([D_LINE_NM]))
     without = packed.n_gap.copy()
     without[0, 7] = 1.0
@@ -139,12 +138,12 @@ def test_transmittances_left_out():
         found = trace_rays(packed, path, np.zeros(1), np.array([1e-3]), (0.0, 0.0))["weight"][0]
         assert mirrors == 2
         assert found == pytest.approx(expected, rel=1e-5)
-        assert expected < 0.95 * r[j] * r[i]  # leaving them out would show
+        assert expected < 0.95 * r[j] * r[i]  # without T the test would fail
 
 
 @pytest.mark.parametrize("ringing", RINGING)
 def test_one_intensity_per_ghost(ringing):
-    """A ghost near a caustic is far from even: its peak is many times its mean, and the flux still adds up."""
+    """A ghost near a caustic is not uniform: its peak is many times its mean, and the flux is still correct."""
     result = rendering(
         "tessar-brendel", (12.0, 0.0), f_number=2.8, size=(320, 180), sensor=(72.0, 40.5), layers="ghosts",
         wavelengths=1, ringing=ringing,
@@ -160,12 +159,12 @@ def test_one_intensity_per_ghost(ringing):
 
 
 def test_folded_cells_dropped():
-    """A sheet folded upon itself: both leaves add, whatever way round their triangles lie on the sensor."""
+    """A folded sheet: both leaves add light, for either orientation of their triangles on the sensor."""
     n = 41
     at = np.linspace(0.0, 1.0, n)
     px, py = (g.ravel() for g in np.meshgrid(at, at, indexing="ij"))
     data = np.zeros((n * n, STOP_X + 2))
-    # y runs forth and back, so the upper half of the pupil lands upside down on the lower half's place
+    # y runs up and back down, so the upper half of the pupil lands mirrored on the position of the lower half
     data[:, X], data[:, Y] = 10.0 * px, 10.0 * np.minimum(py, 1.0 - py)
     data[:, WEIGHT] = data[:, ALIVE] = 1.0
     k = np.arange(n * n).reshape(n, n)
@@ -185,7 +184,7 @@ def test_folded_cells_dropped():
 
 @pytest.mark.parametrize("ringing", RINGING)
 def test_tone_mapping_before_adding(ringing):
-    """Light adds, and the view comes last: two greys of 0.5 make white, not what their pictures add up to."""
+    """Light is added before the view: two greys of 0.5 make white, not the sum of their encoded pictures."""
     grey = np.full((2, 2, 3), 0.5, np.float32)
     one, two = Layer("starburst", grey, (0, 0, 2, 2)), Layer("ghosts", grey, (0, 0, 2, 2))
     total = beauty([one, two], (2, 2))
@@ -198,7 +197,7 @@ def test_tone_mapping_before_adding(ringing):
 
 
 def test_coating_wavelength_used_as_thickness():
-    """532 nm at index 1.38 is a film of 96.4 nm; as thick as its wavelength it would be no quarter wave at all."""
+    """532 nm at index 1.38 is a film of 96.4 nm; a film of 532 nm would not be a quarter wave."""
     indices, thicknesses = film_stack(QuarterWave(center_wavelength_nm=532.0), 1.0, 1.5)
     assert indices == (1.38,)
     assert thicknesses[0] == pytest.approx(96.4, abs=0.05)
@@ -209,13 +208,13 @@ def test_coating_wavelength_used_as_thickness():
     assert as_thick > 1.5 * quarter
 
 
-# a small opening has small Fresnel numbers, and rings that cost little
+# a small opening has small Fresnel numbers, so rings are fast
 @pytest.mark.parametrize(
     ("ringing", "f_number"),
     [("off", 8.0), ("collins", 128.0), pytest.param("collins", 8.0, marks=pytest.mark.slow)],
 )
 def test_clamped_negative_colours(ringing, f_number):
-    """A spectral cyan has a negative red: it stays in the layers, and only the view brings it in."""
+    """A spectral cyan has a negative red: layers keep it, and only the view moves it into the gamut."""
     cyan = Lines(lines=((500.0, 1.0),))
     (weights,) = band_weights(cyan, np.array([500.0]), "rec709")
     assert weights[0] < -0.1
@@ -233,7 +232,7 @@ def test_clamped_negative_colours(ringing, f_number):
 
 @pytest.mark.parametrize("ringing", RINGING)
 def test_tiny_triangles_lost(ringing):
-    """The same ghosts on pixels as large as the ghosts themselves: no light is lost to triangles within a pixel."""
+    """The same ghosts on pixels as large as the ghosts: no light is lost to triangles within a pixel."""
     fine, coarse = (
         rendering(
             "heliar-tronnier", size=(side, side), sensor=(600.0, 600.0), layers="ghosts", wavelengths=1, ringing=ringing
@@ -247,20 +246,20 @@ def test_tiny_triangles_lost(ringing):
 
 
 def test_sensor_plane_taken_from_the_last_gap_of_the_patent(monkeypatch):
-    """The Canon's last gap of 80 mm is not its image plane, the Heliar's printed one is 0.54 mm off."""
+    """The Canon's last gap of 80 mm is not its image plane, and the Heliar's printed one is off by 0.54 mm."""
     for name, printed, focus in (("canon-28-80", 80.0, 38.3787), ("heliar-tronnier", 81.857, 81.315056)):
         a_lens = load_lens(name)
         assert a_lens.rows[-1].thickness == pytest.approx(printed)
         assert first_order(a_lens).sensor_distance == pytest.approx(focus, abs=1e-3)
-        # of a zoom's hundreds of ghosts none is wanted
-        monkeypatch.setattr("flarewright.optics.ghosts.ghost_paths", lambda *_, **__: ())
-        assert ghost_table(a_lens, FIELD).sensor_distance == pytest.approx(focus, abs=1e-3)
+        # the hundreds of ghosts of a zoom are not needed
+        monkeypatch.setattr("flarewright.optics.rays.ghost_table.ghost_paths", lambda *_, **__: ())
+        assert ghost_table_of(a_lens, FIELD).sensor_distance == pytest.approx(focus, abs=1e-3)
 
 
 def test_stop_semi_diameter_and_diameter_confused():
-    """Direct flux on the axis is pi (f / 2N)^2 T; a diameter for a semi-diameter would make it four times that."""
+    """Direct flux on the axis is pi (f / 2N)^2 T; a diameter for a semi-diameter would quadruple it."""
     a_lens = lens(HELIAR, 4.5)
-    table = ghost_table(a_lens, (0.0, 0.0), f_number=11.0)
+    table = ghost_table_of(a_lens, (0.0, 0.0), f_number=11.0)
     pupil = np.pi * (99.235796 / 22.0) ** 2
     n = [1.0, 1.652, 1.603, 1.0, 1.643, 1.0, 1.0, 1.581, 1.694, 1.0]
     through = np.prod([1.0 - ((n[k] - n[k + 1]) / (n[k] + n[k + 1])) ** 2 for k in range(9)])
@@ -270,7 +269,7 @@ def test_stop_semi_diameter_and_diameter_confused():
 
 
 def test_apertures_of_a_file_taken_for_the_other_half(tmp_path):
-    """A `.lens` column of diameters is halved, told, and makes the same lens as its semi-diameters do."""
+    """A `.lens` column of diameters is halved with a remark, and gives the same lens as its semi-diameters."""
     text = (
         "# Some Triplet 100mm f/2.7\n#\n# Patent: US002453260\n# 7 surfaces, 3 glass elements, f/2.7\n\n"
         "name: Some Triplet 100mm f/2.7\nfocal_length: 99.0\n\nsurfaces:\n"
@@ -292,7 +291,7 @@ def test_apertures_of_a_file_taken_for_the_other_half(tmp_path):
 
 
 def test_dispersion_in_the_stop_plane_but_not_on_the_sensor():
-    """Red and blue land at different places: the direct image shifts with the wavelength as the matrices say."""
+    """Red and blue land at different places: the direct image shifts with wavelength as the matrices predict."""
     a_lens = load_lens("triplet-pestrecov")
     order = first_order(a_lens)
     packed = pack_lens(a_lens, order, (None,) * len(a_lens.rows), np.array([450.0, 610.0]))
@@ -301,36 +300,36 @@ def test_dispersion_in_the_stop_plane_but_not_on_the_sensor():
         on_sensor, at_stop = (abs(float(rays[0][k][0] - rays[1][k][0])) for k in ("y", "stop_y"))
         if all(r["status"][0] for r in rays) and at_stop > 1e-4:
             assert on_sensor > 1e-4, path.name
-    # and the analysis shows it: a ghost's blue is larger or smaller than its red
-    table = [ghost_table(a_lens, FIELD, f_number=8.0, wavelength_nm=nm) for nm in (450.0, 610.0)]
+    # the analysis shows it too: sizes of a ghost differ between blue and red
+    table = [ghost_table_of(a_lens, FIELD, f_number=8.0, wavelength_nm=nm) for nm in (450.0, 610.0)]
     blue, red = (rows_of(t) for t in table)
     shifts = [abs(blue[p].rms_radius_mm / red[p].rms_radius_mm - 1.0) for p in blue if red[p].throughput_mm2 > 0.0]
     assert max(shifts) > 0.01
 
 
 def test_the_sign_of_the_second_mirror():
-    """The first reflection is +2/R and the second -2/R: one sign for both is wrong by more than all."""
+    """The first reflection is +2/R and the second -2/R: one sign for both would be completely wrong."""
     a_lens = lens(TRIPLET, 5.0)
     s = system(TRIPLET, 5.0)
-    row = rows_of(ghost_table(a_lens, (3.0, 0.0)))[(3, 2)]
+    row = rows_of(ghost_table_of(a_lens, (3.0, 0.0)))[(3, 2)]
     truth = estimate(s, (3, 2), (3.0, 0.0), film_sets=[[()] * len(s.rows)], samples=4000, replicas=4)[0]
     assert row.rms_radius_mm == pytest.approx(truth.rms_radius_mm, rel=0.03)
 
 
 def test_the_shader_that_four_codes_copy():
-    """At its design wavelength a real quarter wave reflects what the formula says, not 1.2 to 2.6 times as much."""
+    """At its design wavelength a real quarter wave reflects what the formula gives, not 1.2 to 2.6 times as much."""
     for n_glass in (1.5, 1.65, 1.8):
         indices, thicknesses = film_stack(QuarterWave(center_wavelength_nm=550.0), 1.0, n_glass)
         found = stack_reflectance(1.0, n_glass, indices, thicknesses, 550.0, np.array([1.0]))[0]
         n1 = indices[0]
         assert found == pytest.approx(((n_glass - n1**2) / (n_glass + n1**2)) ** 2, abs=1e-12)
-    # and at the edge of grazing it is finite and below 1
+    # near grazing incidence it is finite and below 1
     grazing = stack_reflectance(1.0, 1.5, (1.38,), (99.6,), 550.0, np.array([1e-6]))[0]
     assert 0.99 < grazing <= 1.0
 
 
 def test_no_dispersion_assumed_in_silence(tmp_path):
-    """V_d = 0 behind a glass is unknown, and said so."""
+    """V_d = 0 behind a glass means unknown, with a remark."""
     path = tmp_path / "unknown.lens"
     path.write_text(
         "# Some Triplet 100mm f/2.7\n# 7 surfaces, 3 glass elements, f/2.7\n\nname: x\nfocal_length: 99.0\n"
@@ -345,9 +344,9 @@ def test_no_dispersion_assumed_in_silence(tmp_path):
 
 
 def test_bare_means_bare():
-    """No film equals Fresnel: asking for no coating gives the bare ghosts, brighter than any coated ones."""
+    """No film equals Fresnel: without a coating the ghosts are bare, and brighter than any coated ones."""
     bare, coated = (
-        ghost_table(lens(HELIAR, 8.0), FIELD, coating=Everywhere(coating=c))
+        ghost_table_of(lens(HELIAR, 8.0), FIELD, coating=Everywhere(coating=c))
         for c in (Bare(), QuarterWave(center_wavelength_nm=D_LINE_NM))
     )
     assert bare.ghosts[0].throughput_mm2 > 3.0 * coated.ghosts[0].throughput_mm2

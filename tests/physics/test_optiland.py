@@ -1,6 +1,6 @@
-"""A second engine's answer: skew rays of image and ghost paths against optiland, to 1e-9 mm.
+"""Skew rays of image and ghost paths against optiland, a second engine, to 1e-9 mm.
 
-Optional (`pytest -m oracle`): optiland is heavy (it pulls in 1.3 GB), so it runs in a process of its own, in the
+Optional (`pytest -m oracle`): optiland is large (1.3 GB with dependencies), so it runs in a separate process, in the
 interpreter that FLAREWRIGHT_ORACLE_PYTHON names, else in this one.
 """
 
@@ -67,7 +67,7 @@ def optiland() -> None:
 
 
 def compare(ours: Rays, theirs: dict[str, list[float]]) -> int:
-    """Rays that live in our trace and pass near the glass; optiland knows no rule for the rest."""
+    """Compare rays that are alive in our trace and pass near the glass; optiland does not end other rays."""
     near = ours.alive & (ours.rel_radius < 1.0)
     for a, b in ((ours.x, theirs["x"]), (ours.y, theirs["y"])):
         assert np.abs(a[near] - np.array(b)[near]).max(initial=0.0) < 1e-9
@@ -94,10 +94,11 @@ def test_the_oracle_traces_as_optiland_does(name, conic):
 @pytest.mark.usefixtures("optiland")
 @pytest.mark.parametrize("name", CASES)
 def test_the_program_traces_as_optiland_does(name):
-    from flarewright.optics.pack import pack_lens
-    from flarewright.optics.paraxial import first_order
-    from flarewright.optics.paths import direct_path, ghost_path
-    from flarewright.optics.trace import trace_rays
+    from sensor_rays import trace_rays
+
+    from flarewright.optics.lens.paraxial import first_order
+    from flarewright.optics.lens.paths import direct_path, ghost_path
+    from flarewright.optics.rays.pack import pack_lens
 
     table, f_number, paths = CASES[name]
     a_lens, s = lens(table, f_number), system(table, f_number)
@@ -128,7 +129,7 @@ SHAPES: dict[str, dict[int, dict[str, Any]]] = {
         5: {"asphere": (1e-5, 1e-7), "decentre": (0.2, 0.3), "tilt_deg": (0.7, -1.1)},
         6: {"curvature_x": 0.0, "tilt_deg": (0.4, 0.2)},
     },
-    # optiland refuses rays beyond the terms' disc, so that is wide
+    # optiland rejects rays beyond the disc of the terms, so the disc is large
     "figure errors": {1: {"figure": {5: 4000.0, 7: -3e4, 11: 2.5e4, 14: 1e4, 24: 5e4}, "semi_diameter": 60.0}},
 }
 
@@ -146,7 +147,7 @@ def shaped(base: Any, changes: dict[int, dict[str, Any]]) -> Any:
 
 
 def in_optilands_words(a_lens: Any, row: dict[str, Any], k: int) -> dict[str, Any]:
-    """The row of a job, with its shape."""
+    """Return the row of a job with its shape."""
     surface = a_lens.rows[k]
     if not hasattr(surface, "asphere"):
         return row
@@ -158,7 +159,7 @@ def in_optilands_words(a_lens: Any, row: dict[str, Any], k: int) -> dict[str, An
         words |= {"curvature_x": cx, "conic_x": kx}
     if surface.figure is not None:
         terms = dict(surface.figure.zernike_nm)
-        # Noll's first term is piston; optiland's terms are of root mean square 1 too
+        # Noll's first term is piston; optiland's terms have root mean square 1 too
         words["zernike"] = [terms.get(j, 0.0) * 1e-6 for j in range(1, 29)], surface.semi_diameter
     return words
 
@@ -166,10 +167,11 @@ def in_optilands_words(a_lens: Any, row: dict[str, Any], k: int) -> dict[str, An
 @pytest.mark.usefixtures("optiland")
 @pytest.mark.parametrize("name", SHAPES)
 def test_surfaces_of_any_shape_and_place_trace_as_in_optiland(name):
-    from flarewright.optics.pack import pack_lens
-    from flarewright.optics.paraxial import first_order
-    from flarewright.optics.paths import direct_path, ghost_path
-    from flarewright.optics.trace import trace_rays
+    from sensor_rays import trace_rays
+
+    from flarewright.optics.lens.paraxial import first_order
+    from flarewright.optics.lens.paths import direct_path, ghost_path
+    from flarewright.optics.rays.pack import pack_lens
 
     table, f_number, paths = CASES["triplet"]
     a_lens, s = shaped(lens(table, f_number), SHAPES[name]), system(table, f_number)
@@ -190,7 +192,7 @@ def test_surfaces_of_any_shape_and_place_trace_as_in_optiland(name):
         near = (rays["status"] > 0) & (rays["rel_radius"] < 1.0)
         for axis in ("x", "y"):
             off = np.abs(-rays[axis][near] - np.array(answer[axis])[near])
-            # of waves of 30 um, the sums of 28 terms round differently by a nanometre's thousandth
+            # waves of 30 um: the sums of 28 terms differ in rounding by 1e-12 m
             assert off.max(initial=0.0) < (2e-9 if name == "figure errors" else 1e-9)
         seen += int(near.sum())
         moved = max(moved, float(np.abs(rays["x"] - before["x"])[near].max(initial=0.0)))

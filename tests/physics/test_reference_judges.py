@@ -1,4 +1,4 @@
-"""Final quality against the reference: every block of 16 x 16 pixels, every path, with regard to the variance."""
+"""Final quality against the reference: every block of 16 x 16 pixels and every path, with the variance."""
 
 import numpy as np
 import path_rays
@@ -7,13 +7,13 @@ from judge import blocks_of, deviations, judge, probabilities
 from path_rays import path_flux
 from scipy import stats
 
-from flarewright.kernels.montecarlo import IN_PICTURE
+from flarewright.kernels.montecarlo.forward import IN_PICTURE
 from flarewright.model import Camera, Everywhere, Iris, Light, Lines, Output, Project, Quality, QuarterWave, Surface
-from flarewright.render.montecarlo import ray_source, run_batch
-from flarewright.render.opening import make_opening
-from flarewright.render.prepare import load_lens, settle
+from flarewright.render.reference.batches import ray_source, run_batch
 from flarewright.render.render import render
-from flarewright.render.shots import make_shots
+from flarewright.render.scene.opening import make_opening
+from flarewright.render.scene.resolve import load_lens, resolve_project
+from flarewright.render.scene.shots import make_shots
 
 D_LINE = Lines(lines=((587.56, 1.0),))
 
@@ -28,11 +28,11 @@ LENSES = {
     "nikon-28-75": (15.0, 8.0),
 }
 
-# thirty-two judgements are made; less probable than this is no chance
+# significance level: there are thirty-two comparisons
 CHANCE = 1e-4
-# a path's flux, apart from chance; and of which paths: those above this part of all ghosts
+# allowed error of a path's flux, apart from chance, for paths above this part of all ghosts
 PATH, FAINTEST = 5e-3, 1e-3
-# and by rays of one path alone above this
+# and above this, with rays of one path alone
 FAINT = 1e-4
 
 
@@ -61,24 +61,26 @@ def assert_paths_agree(judged):
     flux = judged.total[1]
     worth = {name: path for name, path in judged.paths.items() if path[1] > FAINTEST * flux}
     assert sum(mean for _, mean, _ in worth.values()) > 0.9 * flux
-    # a t variable's bound for the worst of so many
+    # bound of a t variable for the worst of all paths
     bound = stats.t.isf(CHANCE / (2 * len(worth)), judged.batches - 1)
     for name, (final, mean, error) in worth.items():
         assert abs(final - mean) < PATH * mean + bound * error, name
 
 
-def told_of_paths(judged):
-    """Say how many paths were judged, how well the reference knows them, and how far the worst is off."""
+def reported_of_paths(judged):
+    """Return how many paths are compared, how well the reference knows them, and the largest error."""
     flux = judged.total[1]
     worth = {name: path for name, path in judged.paths.items() if path[1] > FAINTEST * flux}
     off = {name: (final / mean - 1.0, error / mean) for name, (final, mean, error) in worth.items()}
     known = {name: pair for name, pair in off.items() if pair[1] < PATH / 4.0}
     share = np.mean([abs(deviation) < PATH + 2.0 * error for deviation, error in off.values()])
-    told = f"{len(worth)} paths, {share:.0%} within {PATH:.1%} and two errors, {len(known)} known to {PATH / 4.0:.3%}"
+    reported = (
+        f"{len(worth)} paths, {share:.0%} within {PATH:.1%} and two errors, {len(known)} known to {PATH / 4.0:.3%}"
+    )
     if not known:
-        return told
+        return reported
     worst = max(known, key=lambda name: abs(known[name][0]))
-    return f"{told}, the worst of those ({worst}) {known[worst][0]:+.2%} +- {known[worst][1]:.2%} off"
+    return f"{reported}, the worst of those ({worst}) {known[worst][0]:+.2%} +- {known[worst][1]:.2%} off"
 
 
 @pytest.fixture(scope="module", params=[24, pytest.param(64, marks=pytest.mark.slow)])
@@ -103,7 +105,7 @@ def test_a_small_picture_agrees(small):
 
 
 def test_wrong_pictures_are_refused(small):
-    """The judgement has teeth: 5 % too bright, a path left out, a shift by half a block, a mirrored picture."""
+    """The test is sharp: it detects 5 % too bright, a missing path, a shift by half a block, a mirrored picture."""
     project, judged = small
     layers = render(project).layers
     ghosts = next(layer for layer in layers if layer.name == "ghosts")
@@ -124,16 +126,16 @@ def test_wrong_pictures_are_refused(small):
 
 
 def two_singlets():
-    """Return the triplet without its middle lens, whose four-reflection paths are 24, not 190."""
+    """Return the triplet without its middle lens, which has 24 four-reflection paths instead of 190."""
     whole = load_lens("triplet-pestrecov")
     rows = (*whole.rows[:2], *whole.rows[4:])
     return whole.replace(name="two singlets", rows=rows, coating_presets={}, sensor_distance=None)
 
 
-# two singlets have paths of the same kinds; the faintest of the triplet take seconds to find
+# two singlets have paths of the same kinds; finding the faintest of the triplet takes seconds
 @pytest.fixture(scope="module", params=["two singlets", pytest.param("triplet", marks=pytest.mark.slow)])
 def fours(request):
-    """All four-reflection ghosts of an uncoated lens that are worth anything; a side of the reference's batches."""
+    """All relevant four-reflection ghosts of an uncoated lens; a side of the reference's batches."""
     lens, limit, side = (two_singlets(), 4e-6, 32) if request.param != "triplet" else ("triplet-pestrecov", 1e-6, 64)
     project = scene(lens, (8.0, 4.0), 4.0, size=(96, 64))
     project = project.replace(quality=project.quality.replace(orders=4, order4_limit=limit))
@@ -145,7 +147,7 @@ def test_ghosts_of_four_reflections_agree(fours):
     project, rendering, side = fours
     layers = {layer.name: layer for layer in rendering.layers}
     facts = rendering.summary["ghosts.order4"]
-    assert facts["drawn"] > (130 if len(settle(project).lens.rows) > 5 else 20)
+    assert facts["drawn"] > (130 if len(resolve_project(project).lens.rows) > 5 else 20)
     assert facts["left_out_share"] < 1e-3
     singles = [layer for name, layer in layers.items() if name.count("-") == 3]
     assert len(singles) == facts["drawn"]
@@ -160,7 +162,7 @@ def test_ghosts_of_four_reflections_agree(fours):
     _, mean, error = judged.total
     assert error < 0.02 * mean
     assert abs(final.sum() - mean) < 5e-3 * mean + 4.0 * error
-    # and without them the picture is the same but for them
+    # without them the picture is otherwise the same
     two = {layer.name: layer for layer in render(pairs).layers}
     np.testing.assert_array_equal(two["ghosts"].pixels, layers["ghosts"].pixels)
     np.testing.assert_array_equal(
@@ -169,11 +171,11 @@ def test_ghosts_of_four_reflections_agree(fours):
 
 
 def test_every_path_of_four_reflections_agrees(fours):
-    """Flux of each path against the rays that the reference saw take it."""
+    """Flux of each path against the reference's rays along it."""
     project, rendering, side = fours
     drawn = {str(layer.about["path"]): float(layer.about["flux_mm2"]) for layer in rendering.layers
              if layer.name.count("-") == 3}  # fmt: skip
-    settled = settle(project)
+    settled = resolve_project(project)
     shots = make_shots(settled, make_opening(settled, None))
     limit = project.quality.order4_limit
     sources = [ray_source(shot, 7, side=side, light=k, followed=(4.0, 0.0)) for k, shot in enumerate(shots)]
@@ -186,7 +188,7 @@ def test_every_path_of_four_reflections_agrees(fours):
         two += float(result["figures"][IN_PICTURE + 1]) / batches
     mean, error = found.mean(axis=0), found.std(axis=0, ddof=1) / np.sqrt(batches)
     keys = {"-".join(map(str, np.unravel_index(k, (count,) * 4))): k for k in np.flatnonzero(mean)}
-    # none that is clearly above the limit is missing
+    # no path clearly above the limit is missing
     assert {name for name, k in keys.items() if mean[k] - 4.0 * error[k] > 1.3 * limit * two} <= set(drawn)
     bright = {name: flux for name, flux in drawn.items() if flux > 3e-5 * two}
     assert len(bright) > (80 if len(settled.lens.rows) > 5 else 20)
@@ -196,7 +198,7 @@ def test_every_path_of_four_reflections_agrees(fours):
         assert abs(flux - mean[k]) < PATH * mean[k] + bound * error[k], name
 
 
-def test_what_is_left_out_of_four_reflections_is_told():
+def test_a_remark_states_the_missing_four_reflection_flux():
     project = scene("heliar-tronnier", (10.0, 5.0), 8.0, size=(48, 32))
     found = {}
     for limit in (1e-3, 1e-4):
@@ -211,8 +213,8 @@ def test_what_is_left_out_of_four_reflections_is_told():
 
 
 def judged_paths(project, batches=8):
-    """Flux of every path: final quality's, the reference's by rays of that path alone, its standard error."""
-    settled = settle(project)
+    """Return the flux of every path from final quality and from path rays of the reference, and its error."""
+    settled = resolve_project(project)
     shot = make_shots(settled, make_opening(settled, None))[0]
     final = {str(layer.about["path"]): float(layer.about["flux_mm2"]) for layer in render(project).layers
              if layer.name.startswith("ghost.")}  # fmt: skip
@@ -221,9 +223,10 @@ def judged_paths(project, batches=8):
     return {f"{j}-{i}": (final.get(f"{j}-{i}", 0.0), *path_flux(shot, j, i, batches)) for j, i in pairs}
 
 
-@pytest.mark.parametrize(("side", "points"), [(32, 6_000), pytest.param(64, 12_000, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("side", "points"), [(32, 6_000), (64, 12_000)])
 def test_rays_of_one_path_are_the_references(side, points, monkeypatch):
-    """All paths at once, and each by itself: by z-test."""
+    """All paths at once, and each separately: by z-test."""
     monkeypatch.setattr(path_rays, "POINTS", points)
     project = scene("triplet-pestrecov", (8.0, 4.0), 4.0, size=(96, 64), iris=Iris(blades=5))
     judged = judge(project, batches=64, side=side)
@@ -234,7 +237,7 @@ def test_rays_of_one_path_are_the_references(side, points, monkeypatch):
             z.append((alone[name][1] - mean) / np.hypot(alone[name][2], error))
     assert len(z) > 10
     assert 2.0 * len(z) * stats.t.sf(np.abs(z).max(), 7) > CHANCE
-    # and each is known far better
+    # each path is known much better
     assert all(error < 2e-3 * mean for _, mean, error in alone.values() if mean > 1e-6 * judged.total[1])
 
 
@@ -244,13 +247,13 @@ def test_rays_of_one_path_are_the_references(side, points, monkeypatch):
 def test_every_path_agrees(lens, stopped):
     """Every path above 1e-4 of the ghost light in the picture: within half a percent, apart from chance.
 
-    The zooms have 351 paths and more and take minutes.
+    The zooms have at least 351 paths and take minutes.
     """
     widest = load_lens(lens).f_number
     f_number = (4.0 if widest < 2.0 else 2.8) * widest if stopped else None
     paths = judged_paths(scene(lens, LENSES[lens], f_number))
     flux = sum(mean for _, mean, _ in paths.values())
-    # what one lucky ray tells is not known to be so bright
+    # a path whose flux comes from one lucky ray is not known to be so bright
     worth = {name: path for name, path in paths.items() if max(path[0], path[1] - 3.0 * path[2]) > FAINT * flux}
     worst = max(worth, key=lambda name: abs(worth[name][0] / worth[name][1] - 1.0))
     final, mean, error = worth[worst]
@@ -261,14 +264,14 @@ def test_every_path_agrees(lens, stopped):
     bound = stats.t.isf(CHANCE / (2 * len(worth)), 7)
     for name, (final, mean, error) in worth.items():
         assert abs(final - mean) < PATH * mean + bound * error, name
-        # so that chance hides nothing
+        # so that chance cannot hide an error
         assert error < PATH * mean, name
     assert sum(final for final, _, _ in paths.values()) == pytest.approx(flux, rel=2e-3)
 
 
 @pytest.mark.slow
 def test_a_lens_out_of_true_agrees():
-    """Aspheric, with a cylinder's share, its rear surface decentred and tilted: nothing is symmetric."""
+    """Aspheric, slightly cylindrical, with a decentred and tilted rear surface: no symmetry."""
     lens = load_lens("triplet-pestrecov")
     rows = list(lens.rows)
     rows[0] = rows[0].replace(asphere=(-2e-6, 1e-9))
@@ -294,11 +297,11 @@ def test_lenses_agree_block_by_block(lens, stopped):
     print(
         f"{lens} {'stopped down' if stopped else 'open'}: total {final / mean - 1.0:+.2%} +- {error / mean:.2%}, "
         f"{deviations(judged).size} blocks p = {everywhere:.3f}, worst p = {worst:.3f}, "
-        f"four and more reflections {judged.high_share:.2%}; {told_of_paths(judged)}"
+        f"four and more reflections {judged.high_share:.2%}; {reported_of_paths(judged)}"
     )
     assert everywhere > CHANCE
     assert worst > CHANCE
     assert abs(final - mean) < 2e-3 * mean + 4.0 * error
     assert_paths_agree(judged)
-    # more than two reflections are always there, and never the larger part
+    # higher orders always exist and are never the larger part
     assert 0.0 < judged.high_share < 0.3

@@ -1,13 +1,13 @@
-"""Light runs back the way it came: the package's tracer, through a lens and through the same lens turned round."""
+"""Light is reversible: the package's tracer, through a lens and through the reversed lens."""
 
 import numpy as np
 import pytest
 
-from flarewright.kernels.trace import trace_hits
-from flarewright.optics.pack import pack_lens
-from flarewright.optics.paraxial import first_order
-from flarewright.optics.paths import direct_path, ghost_paths
-from flarewright.render.prepare import load_lens
+from flarewright.kernels.tracing.sequential import trace_hits
+from flarewright.optics.lens.paraxial import first_order
+from flarewright.optics.lens.paths import direct_path, ghost_paths
+from flarewright.optics.rays.pack import pack_lens
+from flarewright.render.scene.resolve import load_lens
 
 
 @pytest.mark.parametrize("name", ["heliar-tronnier", "canon-28-80", "tessar-brendel"])
@@ -32,7 +32,7 @@ def test_a_ray_returns_through_the_lens_turned_round(name):
             hit, end = there[0, -2], there[0, -1]
             way = (end - hit) / np.linalg.norm(end - hit)
             x, y, _ = hit + way * (last - hit[2]) / way[2]
-            # turned about the axis so that the ray begins in the frame that the tracer wants
+            # rotated about the axis into the frame that the tracer expects
             angle = np.arctan2(-way[0], -way[1])
             turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
             start = turn @ [x, y]

@@ -1,4 +1,4 @@
-"""A flare of closed forms, to judge predictions by: a disc that moves and fades, and a spot of one constellation."""
+"""A flare of closed form as a reference for predictions: a moving, fading disc, and a spot at one constellation."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ SIDE_MM = 50.0
 
 
 def disc_light(constellation_deg):
-    """Irradiance of the disc: halves every ten degrees."""
+    """Return the irradiance of the disc, which halves every ten degrees."""
     return 1e-3 * 0.5 ** (constellation_deg / 10.0)
 
 

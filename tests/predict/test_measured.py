@@ -1,4 +1,4 @@
-"""A measured flare goes where a lens goes: curves and scenes from a ghost model."""
+"""Predictions of a measured flare: curves and scenes from a ghost model."""
 
 import json
 from functools import cache
@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from flarewright.cli.app import run
-from flarewright.cli.predict_measured import Counting, model_flare
 from flarewright.errors import FlarewrightError
-from flarewright.io.ghost_model_file import names_ghost_model, write_ghost_model
-from flarewright.measure.placing import over_clipping
-from flarewright.measure.replay import light_px, replay
-from flarewright.model.ghost_model import BezierGhost, GhostModel, Halo, Reference, Star
-from flarewright.model.replay_camera import ReplayCamera
-from flarewright.optics.color import luminance_weights
+from flarewright.io.measurement.ghost_model_file import is_ghost_model_file, write_ghost_model
+from flarewright.measure.replay.model_image import light_px, replay_model
+from flarewright.measure.replay.placement import over_clipping
+from flarewright.model.measurement.ghost_model import BezierGhost, GhostModel, Halo, Reference, Star
+from flarewright.model.measurement.replay_camera import ReplayCamera
+from flarewright.optics.colour.rgb import luminance_weights
+from flarewright.workflow.measured_flares import Counting, model_flare, model_flares
 
-# the captures' light: 1e5 cd/m2 on 1e-4 sr give 10 lx
+# light of the captures: 1e5 cd/m2 over 1e-4 sr give 10 lx
 CAPTURED = Reference(f_number=2.0, iso=100.0, exposure_s=0.5, luminance_cd_m2=1e5, solid_angle_sr=1e-4)
 
 
@@ -40,10 +40,10 @@ def file(tmp_path):
 
 @cache
 def summed(model, constellation_deg, roll_deg=0.0, around=1.0 / 18.0, finer=4):
-    """Add up a replay without the disc around the light, in fine pixels that are in or out; the mean luminance."""
+    """Return the mean luminance of a replay without the disc around the light, from fine binary pixels."""
     width, height = model.size_px
     size = width * finer, height * finer
-    layers = {one.name: one.pixels for one in replay(model, constellation_deg, roll_deg=roll_deg, size_px=size)}
+    layers = {one.name: one.pixels for one in replay_model(model, constellation_deg, roll_deg=roll_deg, size_px=size)}
     x, y = light_px(model, constellation_deg, roll_deg)
     down, right = np.mgrid[: size[1], : size[0]] + 0.5
     inside = np.hypot(right / finer - x, down / finer - y) < around * width
@@ -57,18 +57,27 @@ def mean_of(model, constellation_deg, roll_deg=0.0, **counting):
 
 
 def test_its_flare_is_the_replayed_flare_per_lux_without_the_light(file):
-    assert names_ghost_model(str(file))
+    assert is_ghost_model_file(str(file))
     flare = model_flare(planted(), "camera.json", 36.0, 0.02, 192, Counting())
-    assert (flare.least_deg, flare.reach_deg) == (1.0, 26.0)
+    assert (flare.least_deg, flare.reach_deg) == (2.0, 25.0)
     assert (flare.sensor.width, flare.sensor.height) == (36.0, 20.25)
-    # in the picture, half out of it, out of it
-    for angle in (12.0, 25.5):
+    # light in the picture, half outside
+    for angle in (12.0, 25.0):
         expected = summed(planted(), angle, 40.0) / 10.0
         assert mean_of(planted(), angle, 40.0) == pytest.approx(expected, rel=2e-3)
-    ghosts = next(one for one in replay(planted(), 12.0, size_px=(960, 540)) if one.name == "ghosts").pixels
+    ghosts = next(one for one in replay_model(planted(), 12.0, size_px=(960, 540)) if one.name == "ghosts").pixels
     alone = float((ghosts @ luminance_weights("rec709")).mean()) / 10.0
     assert mean_of(planted(), 12.0, ghosts_only=True) == pytest.approx(alone, rel=2e-3)
     assert mean_of(planted(), 12.0) > 1.2 * alone
+
+
+def test_the_sensor_is_that_of_the_captures_unless_given(tmp_path):
+    paths = []
+    for width in (None, 22.5):
+        paths.append(str(tmp_path / f"{width}.json"))
+        write_ghost_model(tmp_path / f"{width}.json", planted().replace(sensor_width_mm=width))
+    assert [model_flares(path, None, None, Counting()).frame.width for path in paths] == [36.0, 22.5]
+    assert model_flares(paths[1], (32.0, 18.0), None, Counting()).frame.width == 32.0
 
 
 def test_the_disc_around_the_light_is_as_large_as_asked_for():
@@ -79,7 +88,7 @@ def test_the_disc_around_the_light_is_as_large_as_asked_for():
 
 
 def test_ghosts_count_over_the_light_too():
-    """A ghost that lies over the light's image is seen there as without the halo."""
+    """A ghost over the light's image is visible there as without the halo."""
     over = planted().ghosts[0]
     at = light_px(planted(), 12.0)[0] - planted().axis_px[0]
     there = planted().replace(ghosts=(over.replace(numbers=((at,), *over.numbers[1:])),))
@@ -94,14 +103,15 @@ def test_ghosts_count_over_the_light_too():
 
 @pytest.mark.parametrize("width_px", [None, 0.6, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_statistics_do_not_jump_as_the_light_moves_by_a_tenth_of_a_pixel(width_px):
-    """Neither at the disc's border nor where narrow spikes along rows and columns pass between pixels' middles."""
+    """Neither at the disc's border nor where narrow spikes along rows and columns pass between pixel centres."""
     star = None if width_px is None else Star(
         spikes=4, first_deg=0.0, width_px=width_px, radius_px=(1.0, 900.0), radiance=((60.0,) * 3, (1.0,) * 3)
     )  # fmt: skip
     model = planted().replace(size_px=(720, 405), axis_px=(360.0, 202.5), focal_px=765.0, ghosts=(), star=star)
     flare = model_flare(model, "camera.json", 36.0, 0.02, 192, Counting())
     means = []
-    for step in range(11):
+    # a pixel, or half of one, after which positions repeat mirrored
+    for step in range(6 if width_px == 0.6 else 11):
         tangent = 0.1 + 0.1 * step * (720.0 / 192.0) / 765.0
         light = flare.picture(float(np.degrees(np.arctan(tangent))), 30.0) @ luminance_weights("rec709")
         means.append(light.mean())
@@ -119,31 +129,31 @@ def test_curves_of_a_measured_flare(file, tmp_path, capsys):
     assert run([*arguments, "-o", str(tmp_path / "m.html"), "--samples", "8", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["quality"] == "measured"
-    assert data["constellation_deg"][0] == 1.0
-    assert data["constellation_deg"][-1] == 26.0
-    # 5 lx on a camera that was measured with 10
+    assert data["constellation_deg"][0] == 2.0
+    assert data["constellation_deg"][-1] == 25.0
+    # 5 lx at a camera that was measured with 10
     k = 3
     light = summed(planted(), data["constellation_deg"][k])
     assert data["veil_cd_m2"][k] == pytest.approx(light / 10.0 * 5.0 / 0.02, rel=2e-3)
     assert data["k_ratio"][k] == pytest.approx(101.0 / (101.0 + 2.0 * data["veil_cd_m2"][k]))
 
 
-def test_an_f_number_that_nobody_told_is_not_made_up(tmp_path, capsys):
+def test_an_unknown_f_number_is_reported_as_unknown(tmp_path, capsys):
     write_ghost_model(tmp_path / "camera.json", planted(Reference()))
     page = tmp_path / "m.html"
     assert run(["predict", str(tmp_path / "camera.json"), "--samples", "5", "-o", str(page)]) == 0
-    assert "f-number not told" in capsys.readouterr().out
+    assert "f-number unknown" in capsys.readouterr().out
     assert "f/nan" not in page.read_text()
 
 
-def test_values_of_a_model_that_does_not_know_its_light_are_told_in_its_own_unit(file, tmp_path, capsys):
+def test_values_of_a_model_that_does_not_know_its_light_are_reported_in_its_own_unit(file, tmp_path, capsys):
     write_ghost_model(tmp_path / "own.json", planted(Reference()))
     arguments = ["predict", str(tmp_path / "own.json"), "--samples", "5", "--unit-per-cd-m2", "0.02"]
     assert run([*arguments, "-o", str(tmp_path / "m.html"), "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["unit"] == "radiance in the captures' unit, with the light that was photographed"
     assert data["illuminance_lx"] is None
-    # no lux that nobody gave
+    # values are not scaled by an unknown illuminance
     np.testing.assert_allclose(data["veil_cd_m2"], np.array(data["statistics"]["mean"]["values"]) / 0.02)
     page = (tmp_path / "m.html").read_text("utf-8")
     assert data["unit"] in unescape(page)
@@ -152,18 +162,18 @@ def test_values_of_a_model_that_does_not_know_its_light_are_told_in_its_own_unit
     assert run(arguments) == 0
     assert "over the light's illuminance" not in capsys.readouterr().out
     assert run([*arguments, "--illuminance", "5"]) == 2
-    assert "it does not tell luminance_cd_m2 and solid_angle_sr" in capsys.readouterr().err
+    assert "it lacks luminance_cd_m2 and solid_angle_sr" in capsys.readouterr().err
     assert run(["predict", str(file), "--samples", "5", "--json"]) == 0
     assert "over the illuminance" in json.loads(capsys.readouterr().out)["unit"]
 
 
 @pytest.mark.parametrize("text", ['{"frames": [], "axis_px": [1, 2]}', "[1, 2]", "no JSON"])
-def test_json_that_is_no_model_is_told_as_such(tmp_path, capsys, text):
+def test_json_that_is_no_model_is_reported_as_such(tmp_path, capsys, text):
     (tmp_path / "merged.json").write_text(text)
     assert run(["predict", str(tmp_path / "merged.json")]) == 2
-    told = capsys.readouterr().err
-    assert "merged.json is no ghost model: predict takes" in told
-    assert told.count("\n") == 1
+    reported = capsys.readouterr().err
+    assert "merged.json is no ghost model: predict takes" in reported
+    assert reported.count("\n") == 1
 
 
 def test_without_a_unit_there_is_no_veil_to_tell(file, tmp_path, capsys):
@@ -197,26 +207,26 @@ def test_scene_with_a_measured_camera(file, tmp_path, capsys):
     lux = 2000.0 / (100.0 * (1.0 + np.tan(np.radians(14.0)) ** 2))
     veil = summed(planted(), 14.0) / 10.0 * lux / 0.02
     assert data["ranking"][0]["worst_veil_cd_m2"] == pytest.approx(veil, rel=2e-3)
-    # no white level was known: where the sensor clips nobody can tell
+    # without a white level the clipping level is unknown
     assert data["ranking"][0]["brightest_stops_from_clipping"] is None
-    assert any("to clipping is not known: the model does not tell" in remark for remark in data["remarks"])
+    assert any("to clipping is not known: the model does not know" in remark for remark in data["remarks"])
 
 
 def test_a_camera_of_a_scene_says_what_counts(file, tmp_path, capsys):
     scene, x = tmp_path / "scene.toml", 10.0 * np.tan(np.radians(14.0))
     lux = 2000.0 / (100.0 * (1.0 + np.tan(np.radians(14.0)) ** 2))
 
-    def told(words):
+    def reported(words):
         scene.write_text(SCENE.format(x=x).replace("unit_per_cd_m2", f"{words}\nunit_per_cd_m2"))
         assert run(["predict", str(scene), "--json"]) == 0
         data = json.loads(capsys.readouterr().out)
         return data["ranking"][0]["worst_veil_cd_m2"] * 10.0 * 0.02 / lux, " ".join(data["remarks"])
 
-    veil, words = told("around_light = 0.2")
+    veil, words = reported("around_light = 0.2")
     assert veil == pytest.approx(summed(planted(), 14.0, around=0.2), rel=2e-3)
     # atan(0.2 * 160 / 170)
     assert "only farther than 0.2 of the width from the light's image (11 degrees on the axis)" in words
-    veil, words = told('count = "ghosts"')
+    veil, words = reported('count = "ghosts"')
     assert veil == pytest.approx(summed(planted().replace(halo=None), 14.0), rel=2e-3)
     assert "only ghosts are counted" in words
     scene.write_text(SCENE.format(x=x).replace("unit_per_cd_m2", "around_light = 0.6\nunit_per_cd_m2"))
@@ -224,7 +234,7 @@ def test_a_camera_of_a_scene_says_what_counts(file, tmp_path, capsys):
     assert "around_light 0.6 is no part of the picture's width" in capsys.readouterr().err
 
 
-def test_a_sensor_of_other_proportions_than_the_captures_is_refused_where_it_is_told(file, tmp_path, capsys):
+def test_a_sensor_of_other_proportions_than_the_captures_is_refused_where_it_is_reported(file, tmp_path, capsys):
     scene = tmp_path / "scene.toml"
 
     def sum_of(lines):
@@ -232,7 +242,7 @@ def test_a_sensor_of_other_proportions_than_the_captures_is_refused_where_it_is_
         assert run(["predict", str(scene), "--json"]) == 0
         return json.loads(capsys.readouterr().out)["cameras"][0]["lights"][0]["statistics_lx"]["sum_mm2"][0]
 
-    # 36 mm wide where nothing is told, and as high as the captures
+    # default: 36 mm wide, with the captures' aspect ratio
     assert sum_of("sensor_mm = [36, 20.25]") == sum_of("")
     assert sum_of("sensor_mm = [18, 10.1]") == pytest.approx(0.25 * sum_of(""))
     scene.write_text(SCENE.format(x=2.0).replace("unit_per_cd_m2", "sensor_mm = [36, 24]\nunit_per_cd_m2"))
@@ -244,7 +254,7 @@ def test_a_sensor_of_other_proportions_than_the_captures_is_refused_where_it_is_
 
 
 def test_two_cameras_of_one_model_differ_in_settings_and_remarks(tmp_path, capsys):
-    """Equation 8.3 by hand: the captures clip at 4 first, in green, at ISO 100, 0.5 s and f/2."""
+    """Equation 8.3 by hand: the captures clip first in green, at 4, at ISO 100, 0.5 s and f/2."""
     clipping = CAPTURED.replace(clipping=(8.0, 4.0, 5.0))
     write_ghost_model(tmp_path / "camera.json", planted(clipping))
     scene = tmp_path / "scene.toml"
@@ -257,7 +267,7 @@ def test_two_cameras_of_one_model_differ_in_settings_and_remarks(tmp_path, capsy
     stops = {one["camera"]: one["brightest_stops_from_clipping"] for one in data["ranking"]}
     peak = max(data["cameras"][0]["lights"][0]["statistics_lx"]["maximum"])
     assert stops["A"] == pytest.approx(np.log2(peak * (400 / 100) * (0.25 / 0.5) / 4.0))
-    # a quarter of the ISO, and two stops smaller
+    # a quarter of the ISO, and two stops less light
     assert stops["B"] == pytest.approx(stops["A"] - 4.0)
     assert any(one.startswith("B: measured at f/2") for one in data["remarks"])
     assert not any(one.startswith("A: measured at f/2") for one in data["remarks"])
@@ -266,24 +276,24 @@ def test_two_cameras_of_one_model_differ_in_settings_and_remarks(tmp_path, capsy
     data = json.loads(capsys.readouterr().out)
     unsure = {one["camera"]: one["brightest_stops_from_clipping"] for one in data["ranking"]}
     assert unsure == {"A": pytest.approx(stops["A"]), "B": None}
-    assert any("B: how near its brightest spot is to clipping is not known: the model does not tell the f_number" in one
+    assert any("B: how near its brightest spot is to clipping is not known: the model does not know the f_number" in one
                for one in data["remarks"])  # fmt: skip
 
 
 def test_white_light_clips_in_the_colour_that_is_filled_first():
-    """White of luminance 1 is (0.5, 1, 0.4) in this camera, of which green clips at 2, then red at 1.5, blue at 3."""
+    """White of luminance 1 is (0.5, 1, 0.4) in this camera: green clips at 2, red at 1.5, blue at 3."""
     matrix = ((2.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 2.5))
     model = planted(CAPTURED.replace(clipping=(1.5, 2.0, 3.0))).replace(to_rec709=matrix)
     assert over_clipping(model, ReplayCamera()) == pytest.approx(0.5)
     assert over_clipping(model, ReplayCamera(iso=200.0, exposure_s=0.25, f_number=4.0)) == pytest.approx(0.125)
-    # a red that is held down by 0.2 clips first: 0.5 / 0.2
+    # red with a white balance of 0.2 clips first: 0.5 / 0.2
     red = model.replace(reference=CAPTURED.replace(clipping=(0.2, 2.0, 3.0)))
     assert over_clipping(red, ReplayCamera()) == pytest.approx(2.5)
-    with pytest.raises(FlarewrightError, match="does not tell at which radiance the sensor of its captures clips"):
+    with pytest.raises(FlarewrightError, match="does not know at which radiance the sensor of its captures clips"):
         over_clipping(planted(), ReplayCamera())
 
 
-def test_a_spectrum_that_makes_no_difference_is_told(file, tmp_path, capsys):
+def test_a_spectrum_that_makes_no_difference_is_reported(file, tmp_path, capsys):
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE.format(x=1.0))
     assert run(["predict", str(scene), "--json"]) == 0
@@ -298,21 +308,21 @@ def test_a_spectrum_that_makes_no_difference_is_told(file, tmp_path, capsys):
     assert data["ranking"] == plain["ranking"]
 
 
-def test_beyond_what_was_measured_is_told(file, tmp_path, capsys):
+def test_beyond_what_was_measured_is_reported(file, tmp_path, capsys):
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE.format(x=10.0))
     assert run(["predict", str(scene), "--json"]) == 0
-    told = capsys.readouterr()
-    assert "was measured from 1 to 26 degrees; lamp stands elsewhere in 100% of the times" in told.err
-    data = json.loads(told.out)
+    reported = capsys.readouterr()
+    assert "was measured from 2 to 25 degrees; lamp stands elsewhere in 100% of the times" in reported.err
+    data = json.loads(reported.out)
     assert data["cameras"][0]["lights"][0]["known"] == [False]
     assert data["cameras"][0]["veil_cd_m2"] == [None]
     assert data["ranking"][0]["mean_veil_cd_m2"] is data["ranking"][0]["contrast_left"] is None
     assert data["ranking"][0]["known_share"] == 0.0
     assert run(["predict", str(scene), "--near", "A", "--radius", "60"]) == 0
-    told = capsys.readouterr()
-    assert "not known" in told.out
-    assert "100 %" not in told.out
+    reported = capsys.readouterr()
+    assert "not known" in reported.out
+    assert "100 %" not in reported.out
 
 
 @pytest.mark.parametrize(
@@ -320,8 +330,8 @@ def test_beyond_what_was_measured_is_told(file, tmp_path, capsys):
     [
         (["--fstop", "8"], "--fstop has no meaning for a measured flare"),
         (["--unit-per-cd-m2", "0"], "--unit-per-cd-m2 0 is no unit"),
-        (["--luminance", "1,100"], "--luminance 1,100 tells nothing without --unit-per-cd-m2"),
-        (["--to", "50"], "up to 26"),
+        (["--luminance", "1,100"], "--luminance 1,100 has no effect without --unit-per-cd-m2"),
+        (["--to", "50"], "up to 25"),
         (["--glare"], "--glare has no meaning"),
         (["--check", "3"], "--check has no meaning for a measured flare"),
         (["--around-light", "-0.1"], "--around-light -0.1 is no part of the picture's width"),
@@ -338,8 +348,8 @@ def test_beyond_what_was_measured_is_told(file, tmp_path, capsys):
 )
 def test_bad_flags_for_a_measured_flare(flags, words, file, capsys):
     assert run(["predict", str(file), *flags]) == 2
-    told = capsys.readouterr().err
-    assert words in told
+    reported = capsys.readouterr().err
+    assert words in reported
 
 
 @pytest.mark.parametrize("flags", [["--around-light", "0.1"], ["--count", "all"]])
@@ -355,11 +365,11 @@ def test_what_counts_of_a_lens_is_no_choice(flags, tmp_path, capsys):
     ("lines", "words"),
     [
         ("around_light = -0.1", "around_light"),
-        ('count = "ghosts"\naround_light = 0.1', "around_light says where more than ghosts counts"),
+        ('count = "ghosts"\naround_light = 0.1', "around_light has no effect with count"),
         ('count = "halo"', "count"),
     ],
 )
-def test_mistakes_about_what_counts_are_told_of_a_scene(lines, words, tmp_path, capsys):
+def test_mistakes_about_what_counts_are_reported_of_a_scene(lines, words, tmp_path, capsys):
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE.format(x=2.0).replace("unit_per_cd_m2", f"{lines}\nunit_per_cd_m2"))
     assert run(["scene", "check", str(scene)]) == 2
@@ -371,7 +381,7 @@ def test_mistakes_about_what_counts_are_told_of_a_scene(lines, words, tmp_path, 
     assert one.split()[0] in capsys.readouterr().err
 
 
-def test_a_page_tells_what_is_left_out(file, tmp_path, capsys):
+def test_a_page_reports_what_is_left_out(file, tmp_path, capsys):
     page = tmp_path / "m.html"
     for flags, words in (
         ([], "the light's own image is left out"),
@@ -400,23 +410,23 @@ def test_a_model_with_nothing_in_it_says_so_instead_of_what_counts(tmp_path, cap
     for change, flags, words in (
         ({"halo": None}, [], "there is nothing in the model: it has no ghosts, halo, star or sprites"),
         ({"halo": None}, ["--count", "ghosts"], "there is nothing in the model"),
-        ({"halo": lit}, ["--count", "ghosts"], "nothing is counted: only ghosts were asked for"),
+        ({"halo": lit}, ["--count", "ghosts"], "nothing is counted: only ghosts were requested"),
         ({"halo": lit}, [], None),
     ):
         write_ghost_model(path, planted().replace(ghosts=(), **change))
         assert run(["predict", str(path), "--samples", "5", *flags]) == 0
-        told = capsys.readouterr().err
-        assert ("are counted" in told) == (words is None)
-        assert words is None or words in told
+        reported = capsys.readouterr().err
+        assert ("are counted" in reported) == (words is None)
+        assert words is None or words in reported
 
 
 def test_a_model_that_does_not_know_its_light_cannot_stand_in_a_scene(tmp_path, capsys):
     write_ghost_model(tmp_path / "camera.json", planted(Reference(f_number=2.0)))
     (tmp_path / "scene.toml").write_text(SCENE.format(x=2.0))
     assert run(["predict", str(tmp_path / "scene.toml")]) == 2
-    told = capsys.readouterr().err
-    assert "does not tell luminance_cd_m2 and solid_angle_sr" in told
-    assert "write both into the camera.json beside the captures" in told
-    # curves in its own unit are told all the same
+    reported = capsys.readouterr().err
+    assert "does not know luminance_cd_m2 and solid_angle_sr" in reported
+    assert "write both into the camera.json beside the captures" in reported
+    # curves in the model's unit are still possible
     assert run(["predict", str(tmp_path / "camera.json"), "--samples", "5", "--json"]) == 0
-    assert "values are in its own unit" in capsys.readouterr().err
+    assert "values are in its unit" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""Lights nearer than fifty focal lengths are drawn where they are; an interrupted prediction goes on."""
+"""Lights nearer than fifty focal lengths are drawn at their distance; an interrupted prediction resumes."""
 
 import json
 from math import cos, radians, sin
@@ -10,13 +10,13 @@ import pytest
 from flarewright.cli.app import run
 from flarewright.cli.common import remembered
 from flarewright.model import Camera, Light, Output, Project, Quality
-from flarewright.optics.color import luminance_weights
+from flarewright.optics.colour.rgb import luminance_weights
 from flarewright.predict import table
-from flarewright.predict.curves import Curves, between
+from flarewright.predict.curves import Curves, interpolated_statistics
 from flarewright.predict.lens_flare import square_flare, statistics_quality
 from flarewright.predict.plan import rounded_distance
 from flarewright.predict.table import FlareTable
-from flarewright.predict.tracks import Sighting
+from flarewright.predict.tracks import CameraSighting
 from flarewright.render.render import render
 
 
@@ -32,7 +32,7 @@ def test_a_near_light_makes_the_flare_that_a_direct_render_shows():
     shot = project.replace(lights=(there,), quality=Quality(), output=Output(starburst=False))
     light = render(shot).layers[0].pixels.astype(float) @ luminance_weights("rec709")
     assert found.mean == pytest.approx(light.mean(), rel=0.01)
-    # which a distant light's is not
+    # the flare of a distant light differs
     far, _ = square_flare(project.replace(lights=(Light(field_deg=(0.0, 0.0)),)), statistics_quality("final"))
     assert abs(FlareTable(far, frame).at(angle, 0.0).mean / found.mean - 1.0) > 0.05
     assert far.fingerprint != flare.fingerprint
@@ -52,7 +52,7 @@ def test_a_near_light_makes_the_flare_that_a_direct_render_shows():
 )
 def test_distances_are_rounded_where_they_matter(distances, lux, drawn):
     nothing = np.zeros(2)
-    sighting = Sighting(nothing, nothing, np.array(lux), nothing, np.array(distances))
+    sighting = CameraSighting(nothing, nothing, np.array(lux), nothing, np.array(distances))
     assert rounded_distance(sighting, 100.0) == (None if drawn is None else pytest.approx(drawn))
     assert rounded_distance(sighting, None) is None
 
@@ -72,14 +72,14 @@ intensity_cd = 100.0
 """
 
 
-def test_a_scene_with_a_near_lamp_draws_it_near_and_one_in_the_lens_is_told(tmp_path, capsys):
+def test_a_scene_with_a_near_lamp_draws_it_near_and_one_in_the_lens_is_reported(tmp_path, capsys):
     def veil(away):
         path = tmp_path / "s.toml"
         path.write_text(SCENE.format(x=away * sin(radians(14.0)), y=away * cos(radians(14.0))))
         assert run(["predict", str(path), "--quality", "draft", "--json"]) == 0
         return json.loads(capsys.readouterr().out)["ranking"][0]["worst_veil_cd_m2"] * away**2
 
-    # but for the inverse square a far lamp's flare is the same wherever it stands, and a near one's is another
+    # except for the inverse square, a far lamp's flare does not depend on its distance; a near one's does
     assert veil(400.0) == pytest.approx(veil(40.0), rel=1e-6)
     assert abs(veil(0.3) / veil(400.0) - 1.0) > 0.005
     (tmp_path / "s.toml").write_text(SCENE.format(x=0.01, y=0.1))
@@ -88,9 +88,9 @@ def test_a_scene_with_a_near_lamp_draws_it_near_and_one_in_the_lens_is_told(tmp_
 
 
 def test_between_samples_decades_are_divided_evenly():
-    # a decade and more, nothing, a factor of four, from darkness, a cliff
+    # more than a decade, constant, a factor of four, from darkness, a discontinuity
     a, b = np.array([1.0, 1.0, 4.0, 0.0, 1.0]), np.array([0.04, 1.0, 1.0, 2.0, 1e-3])
-    np.testing.assert_allclose(between(a, b, 0.5), [0.2, 1.0, 2.0, 1.0, 0.5005])
+    np.testing.assert_allclose(interpolated_statistics(a, b, 0.5), [0.2, 1.0, 2.0, 1.0, 0.5005])
     curves = Curves(np.array([0.0, 10.0]), np.stack([a, b]), 0.0, 0.0)
     assert curves.at(5.0).sum_mm2 == pytest.approx(0.2)
     assert curves.at(-1.0).sum_mm2 == 1.0
@@ -98,7 +98,7 @@ def test_between_samples_decades_are_divided_evenly():
 
 
 def test_a_tail_that_falls_by_decades_is_met_between_few_samples():
-    """Straight lines of the values lie three quarters too high where light falls tenfold from sample to sample."""
+    """Linear interpolation of the values is three quarters too high where light falls tenfold between samples."""
     angles = np.linspace(0.0, 60.0, 7)
     truth = lambda angle: 10.0 ** (-0.1 * angle)  # noqa: E731
     curves = Curves(angles, np.repeat(truth(angles)[:, None], 5, axis=1), 0.0, 0.0)
@@ -106,7 +106,7 @@ def test_a_tail_that_falls_by_decades_is_met_between_few_samples():
         assert curves.at(angle).mean == pytest.approx(truth(angle), rel=1e-9)
 
 
-def test_an_interrupted_prediction_goes_on_beside_its_output(tmp_path, capsys, monkeypatch):
+def test_an_interrupted_prediction_resumes_beside_its_output(tmp_path, capsys, monkeypatch):
     page = tmp_path / "h.html"
     arguments = ["predict", "heliar-tronnier", "--fstop", "16", "--quality", "draft", "--samples", "7", "-o", str(page)]
     drawn = 0
@@ -123,18 +123,18 @@ def test_an_interrupted_prediction_goes_on_beside_its_output(tmp_path, capsys, m
     assert run(arguments) == 130
     assert not page.exists()
     assert (tmp_path / "h.partial.npz").is_file()
-    assert "the same command goes on where it was" in capsys.readouterr().err
+    assert "the same command resumes" in capsys.readouterr().err
     drawn = 0
     monkeypatch.setattr(table, "luminance", lambda picture: counted(picture, -1))
     assert run([*arguments, "--json"]) == 0
-    told = capsys.readouterr()
-    assert "goes on with 5 pictures" in told.err
+    reported = capsys.readouterr()
+    assert "resuming with 5 pictures" in reported.err
     again = drawn
-    # what an interrupted run had drawn is not drawn again, and nothing is left behind
+    # pictures of the interrupted run are reused, and its file is removed
     assert not (tmp_path / "h.partial.npz").exists()
     drawn = 0
     assert run([*arguments, "--json"]) == 0
-    assert capsys.readouterr().out == told.out
+    assert capsys.readouterr().out == reported.out
     assert drawn == again + 5
 
 

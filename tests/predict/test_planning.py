@@ -1,8 +1,9 @@
-"""Scenes: light at a camera, ranking, which camera when and better positions, by cases that a person can follow."""
+"""Scenes: light at a camera, ranking, choice of cameras and better positions, in cases that can be checked by hand."""
 
 import itertools
 import json
 import re
+import threading
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -13,18 +14,18 @@ from painted import painted
 
 from flarewright.cli.app import run
 from flarewright.cli.common import remembered
-from flarewright.errors import ProjectError
-from flarewright.io.flare_cache import read_cache, write_cache
-from flarewright.io.scene_file import EXAMPLE, scene_from_data
-from flarewright.model.scene import Lamp, LampKey, Scene
-from flarewright.optics.constellation import brightness_scale
+from flarewright.errors import FlarewrightError, OutputError, ProjectError
+from flarewright.io.project.scene_file import EXAMPLE, scene_from_data
+from flarewright.io.render_state.flare_cache import read_cache, write_cache
+from flarewright.model.project.scene import Lamp, LampKey, Scene
+from flarewright.optics.lens.field_angles import brightness_scale
 from flarewright.predict.flare import Frame
 from flarewright.predict.photometry import beam, disc_illuminance, exposure_level, point_illuminance
 from flarewright.predict.plan import plan_scene, ranking
 from flarewright.predict.scene_data import found_words
 from flarewright.predict.scene_page import scene_page
 from flarewright.predict.search import best_position
-from flarewright.predict.switching import shots_of, switching
+from flarewright.predict.switching import choose_cameras, switching
 from flarewright.predict.tracks import camera_track, lamp_places, moments, sightings
 
 FRAME = Frame(36.0, 24.0)
@@ -91,7 +92,7 @@ def test_a_lamp_at_the_side():
 
 
 def test_an_aimed_lamp_gives_half_at_the_edge_of_its_beam():
-    # from (10, 10) the camera at the origin lies 45 degrees off an aim along -x
+    # seen from (10, 10) the camera at the origin is 45 degrees off an aim along -x
     found = seen(scene(lights=[lamp(aim_m=(0.0, 10.0, 0.0), beam_deg=90.0)]))[0][0]
     assert found.illuminance_lx[0] == pytest.approx(5.0)
 
@@ -111,10 +112,10 @@ def test_keyframes_are_straight_lines_and_stand_still_beyond():
 def test_distant_light_and_north():
     east = {"kind": "distant", "name": "moon", "azimuth_deg": 90.0, "elevation_deg": 30.0, "illuminance_lx": 0.2}
     found = seen(scene(lights=[east]))[0][0]
-    # to the east of a camera that looks north, 30 degrees up: 90 degrees off its axis
+    # east of a camera that looks north, 30 degrees up: 90 degrees off its axis
     assert found.constellation_deg[0] == pytest.approx(90.0)
     assert found.roll_deg[0] == pytest.approx(30.0)
-    # y of the plan points east: the light stands ahead
+    # y of the plan points east: the light is ahead
     found = seen(scene(lights=[east], north_deg=90.0))[0][0]
     assert found.constellation_deg[0] == pytest.approx(30.0)
     assert found.roll_deg[0] == pytest.approx(90.0)
@@ -128,7 +129,7 @@ def test_the_sun_is_dark_below_the_horizon_that_hides_it():
         time={"start": "2024-03-20T06:00:00+00:00", "duration_s": 21600.0, "step_s": 3600.0},
     )
     lux = seen(given)[0][0].illuminance_lx
-    # on the equator it climbs 15 degrees an hour from six to noon
+    # at the equator the sun climbs 15 degrees per hour from six to noon
     assert (lux > 0.0).tolist() == [False, False, True, True, True, True, True]
     assert lux[-1] == pytest.approx(1.03e5, rel=0.02)
 
@@ -142,7 +143,7 @@ def test_the_sun_is_dark_below_the_horizon_that_hides_it():
         (None, [lamp(aim_m=(10.0, 10.0, 0.0), beam_deg=30.0)], "the lamp aims at its own place"),
     ],
 )
-def test_places_that_do_not_fit_are_told(cameras, lights, words):
+def test_places_that_do_not_fit_are_reported(cameras, lights, words):
     with pytest.raises(ProjectError, match=words):
         seen(scene(cameras, lights))
 
@@ -152,7 +153,7 @@ def test_places_that_do_not_fit_are_told(cameras, lights, words):
 
 
 def test_veil_is_the_mean_flare_as_luminance_of_the_scene():
-    """At 20 degrees, on a node of the table: 0.25e-3 of 10 lx on a disc of 36 pi mm^2, over 0.05 lx per cd/m^2."""
+    """At 20 degrees, a node of the table: 0.25e-3 of 10 lx on a disc of 36 pi mm^2, over 0.05 lx per cd/m^2."""
     position = tuple(np.sqrt(200.0) * np.array([np.sin(np.radians(20.0)), np.cos(np.radians(20.0)), 0.0]))
     given = scene(lights=[lamp(position_m=position)], luminance_cd_m2=(0.0, 0.02))
     found = plan(given)
@@ -188,12 +189,12 @@ def test_a_light_behind_makes_no_flare():
 
 
 def measured_plan(given, reach_deg):
-    """Return a plan whose cameras' flare is known so far and no farther."""
+    """Return a plan whose cameras' flare is known up to a constellation."""
     flare = replace(painted(), reach_deg=reach_deg, dark_beyond=False)
     return plan_scene(given, lambda *_: (flare, FRAME), lambda _: lambda *_: None)
 
 
-def test_beyond_what_was_measured_nothing_is_known_and_nobody_ranks_it():
+def test_pairs_beyond_the_measured_range_are_unknown_and_rank_last():
     aside = lamp(name="aside", position_m=(10.0, 1.0, 0.0), intensity_cd=1e6)
     found = measured_plan(scene(lights=[lamp(position_m=(3.0, 10.0, 0.0)), aside], luminance_cd_m2=(1.0, 9.0)), 30.0)
     assert found.veil(0, 0)[0] > 0.0
@@ -206,6 +207,16 @@ def test_beyond_what_was_measured_nothing_is_known_and_nobody_ranks_it():
     shown = scene_page(found, [known, unknown], (), None, ())
     assert "<td>aside</td><td>not known</td>" in shown
     assert "without flare" not in shown
+
+
+def test_names_of_a_scene_are_escaped_on_its_page():
+    found = plan(scene(cameras=[camera(name='<b>&"')], lights=[lamp(name="<i>")], name="</title>"))
+    shown = scene_page(found, ranking(found), (), None, ())
+    assert "<td>&lt;b&gt;&amp;&#34;</td><td>&lt;i&gt;</td>" in shown
+    assert "<title>Flare plan: &lt;/title&gt;</title>" in shown
+    assert "<b>" not in shown
+    assert "<i>" not in shown
+    assert "&amp;lt;" not in shown
 
 
 def test_a_mean_is_of_the_times_that_are_known():
@@ -222,7 +233,7 @@ def test_a_mean_is_of_the_times_that_are_known():
 
 
 def all_orders(cost, shortest):
-    """The least cost of all orders in which no shot is shorter, by trying them."""
+    """Return the least cost of all orders without shorter shots, by exhaustive search."""
     cameras, count = cost.shape
     best = np.inf
     for order in itertools.product(range(cameras), repeat=count):
@@ -252,15 +263,15 @@ def test_equal_cameras_are_not_switched():
 def test_shots_last_as_long_as_asked():
     veil = np.array([[0.0, 0.0, 1.0, 0.0, 0.0], [1.0, 1.0, 0.0, 1.0, 1.0]])
     times = np.arange(5) * 60.0
-    assert len(shots_of(veil, times, 181.0)) == 1
-    assert shots_of(veil[:1], times, 0.0) == ()
+    assert len(choose_cameras(veil, times, 181.0)) == 1
+    assert choose_cameras(veil[:1], times, 0.0) == ()
 
 
 def test_a_camera_whose_flare_is_not_known_is_taken_only_where_no_other_is_known():
     dark, times = np.nan, np.arange(5) * 60.0
-    shots = shots_of(np.array([[9.0, 9.0, 9.0, 9.0, dark], [1.0, dark, dark, dark, dark]]), times, 0.0)
+    shots = choose_cameras(np.array([[9.0, 9.0, 9.0, 9.0, dark], [1.0, dark, dark, dark, dark]]), times, 0.0)
     assert {shot.camera for shot in shots if shot.first < 3} == {0}
-    assert len(shots_of(np.full((2, 5), dark), times, 0.0)) == 1
+    assert len(choose_cameras(np.full((2, 5), dark), times, 0.0)) == 1
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -268,14 +279,14 @@ def test_a_camera_whose_flare_is_not_known_is_taken_only_where_no_other_is_known
 
 
 def test_search_does_not_go_where_nothing_is_known():
-    """The flare of a measured camera ends at 25 degrees on paper, not in the world."""
+    """The known range of a measured camera ends at 25 degrees; its real flare does not."""
     given = scene([camera(aim_m=(0.0, 10.0, 0.0))], [lamp(position_m=(4.0, 10.0, 0.0))])
     found = best_position(measured_plan(given, 25.0), 0, 6.0)
     best = found.veils_cd_m2[found.best]
     assert np.isnan(found.veils_cd_m2).any()
     assert best == np.nanmin(found.veils_cd_m2) > 0.0
     words = found_words(measured_plan(given, 25.0), found)
-    assert "stand where its flare is not known" in words
+    assert "are where its flare is not known" in words
     lost = best_position(measured_plan(given, 10.0), 0, 6.0)
     assert not lost.better
     assert "is not known" in found_words(measured_plan(given, 10.0), lost)
@@ -283,13 +294,13 @@ def test_search_does_not_go_where_nothing_is_known():
 
 
 def test_search_finds_where_the_lamp_leaves_the_view():
-    """Flare halves every ten degrees and ends at 60: the best place within the disc has the lamp farthest aside."""
+    """Flare halves every ten degrees and ends at 60: at the best place in the disc the lamp is farthest off axis."""
     given = scene([camera(aim_m=(0.0, 10.0, 0.0))], [lamp(position_m=(4.0, 10.0, 0.0))])
     found = best_position(plan(given), 0, 3.0)
     assert found.better
     assert np.hypot(*found.offsets_m[found.best, :2]) <= 3.0 + 1e-9
     assert found.veils_cd_m2[found.best] < 0.9 * found.veils_cd_m2[0]
-    # as good as a fine grid over the disc finds, within a tenth
+    # within a tenth of the best on a fine grid over the disc
     grid = [(x, y) for x in np.linspace(-3.0, 3.0, 25) for y in np.linspace(-3.0, 3.0, 25) if np.hypot(x, y) <= 3.0]
     flare = painted()
     least = min(
@@ -310,12 +321,13 @@ def test_positions_are_compared_at_the_times_that_are_known_where_the_camera_sta
     found = best_position(measured_plan(given, 30.0), 0, 2.0)
     assert (found.moments, found.unknown) == (3, 2)
     assert found.veils_cd_m2[0] == pytest.approx(measured_plan(given, 30.0).veil(0)[0])
-    assert "at the 3 of 5 times at which it is known where it stands" in found_words(measured_plan(given, 30.0), found)
+    words = found_words(measured_plan(given, 30.0), found)
+    assert "at the 3 of 5 times at which the flare at its position is known" in words
 
 
 def test_search_says_when_nothing_is_better():
     moon = {"kind": "distant", "name": "m", "azimuth_deg": 20.0, "elevation_deg": 0.0, "illuminance_lx": 1.0}
-    # it aims so far away that nothing changes within a metre
+    # its aim point is so far away that nothing changes within a metre
     found = best_position(plan(scene([camera(aim_m=(0.0, 1e6, 0.0))], [moon])), 0, 1.0)
     assert not found.better
     behind = best_position(plan(scene([camera()], [{**moon, "azimuth_deg": 180.0}])), 0, 1.0)
@@ -336,7 +348,70 @@ def test_pictures_come_back_from_a_file(tmp_path):
     assert np.array_equal(back["ab"][1.5, 0.0], memory["ab"][1.5, 0.0])
 
 
-def test_what_was_drawn_is_kept_when_someone_presses_ctrl_c(tmp_path):
+def test_damaged_pictures_are_drawn_again(tmp_path):
+    rng = np.random.default_rng(4)
+    memory = {"ab": {(float(k), 0.0): rng.random((4, 5)).astype(np.float32) for k in range(3)}}
+    file = tmp_path / "kept.npz"
+    write_cache(file, memory)
+    whole = file.read_bytes()
+    for at in (*rng.integers(0, 8 * len(whole), 40), *range(32)):
+        data = bytearray(whole)
+        data[at // 8] ^= 1 << at % 8
+        file.write_bytes(data)
+        said = []
+        back = read_cache(file, said.append)
+        for key, picture in back.get("ab", {}).items():
+            assert np.array_equal(picture, memory["ab"][key])
+        # a bit of a date changes nothing
+        assert len(back.get("ab", {})) == 3 or (len(said) == 1 and str(file) in said[0])
+    for size in (0, 3, 30, 500, len(whole) - 1):
+        file.write_bytes(whole[:size])
+        said.clear()
+        assert read_cache(file, said.append) == {}
+        assert len(said) == 1
+
+
+def test_a_file_of_another_kind_is_not_taken_for_a_damaged_cache(tmp_path):
+    for name, data in (("text.npz", b"lens = 'heliar'\n" * 20), ("zip.npz", b"PK\x03\x04" + bytes(300))):
+        (tmp_path / name).write_bytes(data)
+        with pytest.raises(FlarewrightError, match="holds no flares"):
+            read_cache(tmp_path / name)
+    np.savez(tmp_path / "other.npz", weights=np.ones(3))
+    with pytest.raises(FlarewrightError, match="holds no flares"), remembered(tmp_path / "other.npz"):
+        pass
+
+
+def test_a_full_disk_loses_the_cache_and_not_the_prediction(tmp_path, monkeypatch, capsys):
+    def full(path, _pictures):
+        raise OutputError(f"cannot write {path}: no space left on device")
+
+    monkeypatch.setattr("flarewright.io.render_state.flare_cache.write_cache", full)
+    with remembered(tmp_path / "kept.npz") as memory:
+        memory["ab"] = {(1.0, 0.0): np.ones((2, 2), "f4")}
+    said = capsys.readouterr().err
+    assert str(tmp_path / "kept.npz") in said
+    assert said.count("\n") == 1
+
+
+def test_pictures_are_stored_while_the_work_goes_on(tmp_path, monkeypatch):
+    """So that a killed run resumes; here the block itself waits for the file."""
+    monkeypatch.setattr("flarewright.cli.common.CHECKPOINT_S", 0.01)
+    stored = threading.Event()
+    write = write_cache
+
+    def noted(path, pictures):
+        write(path, pictures)
+        stored.set()
+
+    monkeypatch.setattr("flarewright.io.render_state.flare_cache.write_cache", noted)
+    with remembered(None, tmp_path / "page.html") as memory:
+        memory["ab"] = {(1.0, 0.0): np.ones((2, 2), "f4")}
+        assert stored.wait(30.0)
+        assert read_cache(tmp_path / "page.partial.npz")["ab"][1.0, 0.0].sum() == 4.0
+    assert not (tmp_path / "page.partial.npz").exists()
+
+
+def test_drawn_pictures_are_kept_after_ctrl_c(tmp_path):
     file = tmp_path / "kept.npz"
 
     def interrupted():
@@ -351,7 +426,7 @@ def test_what_was_drawn_is_kept_when_someone_presses_ctrl_c(tmp_path):
 
 
 def changed(**places):
-    """The example with values replaced, by dotted place; None takes it away."""
+    """Return the example with values replaced, by dotted path; None removes one."""
     data = tomllib.loads(EXAMPLE)
     for place, value in places.items():
         *way, last = (int(key) if key.isdigit() else key for key in place.split("__"))
@@ -406,7 +481,7 @@ MISTAKES = {
     "intensity": ({"lights__1__intensity_cd": -3.0}, "lights[1].intensity_cd"),
     "diameter": ({"lights__1__diameter_m": 0.0}, "lights[1].diameter_m"),
     "beam": ({"lights__1__beam_deg": 180.0}, "lights[1].beam_deg"),
-    "beam without an aim": ({"lights__1__aim_m": None}, "aim_m and beam_deg belong together"),
+    "beam without an aim": ({"lights__1__aim_m": None}, "aim_m and beam_deg go together"),
     "spectrum": ({"lights__1__spectrum": "red"}, "lights[1].spectrum"),
     "lamp's keyframes fall": ({"lights__1__keyframes": [{"at_s": 3.0}, {"at_s": 1.0}]}, "must rise in time"),
     "sun's illuminance": ({"lights__0__illuminance_lx": 0.0}, "lights[0].illuminance_lx"),
@@ -416,18 +491,18 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("case", MISTAKES)
-def test_mistakes_in_a_scene_are_told_with_their_place(case):
+def test_mistakes_in_a_scene_are_reported_with_their_place(case):
     places, words = MISTAKES[case]
-    with pytest.raises(ProjectError, match=re.escape(words)) as told:
+    with pytest.raises(ProjectError, match=re.escape(words)) as reported:
         scene_from_data(changed(**places), folder=Path(), where="match.toml")
-    assert str(told.value).startswith(("match.toml", "the scene file match.toml"))
+    assert str(reported.value).startswith(("match.toml", "the scene file match.toml"))
 
 
-def test_all_mistakes_are_told_at_once():
+def test_all_mistakes_are_reported_at_once():
     data = changed(cameras__0__iso=0.0, lights__1__spectrum="red", site__latitude_deg=91.0)
-    with pytest.raises(ProjectError) as told:
+    with pytest.raises(ProjectError) as reported:
         scene_from_data(data, folder=Path(), where="match.toml")
-    assert len(told.value.problems) == 3
+    assert len(reported.value.problems) == 3
 
 
 def test_distant_lights_are_checked_too():
@@ -447,7 +522,7 @@ def test_distant_lights_are_checked_too():
 
 def test_schema_accepts_the_example_and_refuses_what_the_reader_refuses():
     jsonschema = pytest.importorskip("jsonschema")
-    from flarewright.io.scene_file import scene_json_schema
+    from flarewright.io.project.scene_file import scene_json_schema
 
     validator = jsonschema.Draft202012Validator(scene_json_schema())
     data = changed()
@@ -484,12 +559,14 @@ position_m = [4.0, 10.0, 4.0]
 """
 
 
-def test_command_plans_a_scene_and_its_veil_is_that_of_a_final_render(tmp_path, capsys, monkeypatch):
-    # bare glass reflects all colours much alike
-    monkeypatch.setattr("flarewright.cli.predict_flares.JUDGED_NM", 3)
+@pytest.mark.parametrize("step_s", [20.0, pytest.param(10.0, marks=pytest.mark.slow)])
+def test_command_plans_a_scene_and_its_veil_is_that_of_a_final_render(step_s, tmp_path, capsys, monkeypatch):
+    # bare glass reflects all colours almost alike
+    monkeypatch.setattr("flarewright.workflow.lens_flares.JUDGED_NM", 3)
     file, page, cache = tmp_path / "s.toml", tmp_path / "s.html", tmp_path / "s.npz"
     file.write_text(SCENE.replace("position_m = [0.0, -20.0, 2.0]", "f_number = 8.0\nposition_m = [0.0, -20.0, 2.0]")
-                    .replace("position_m = [5.0", "f_number = 8.0\nposition_m = [5.0"))  # fmt: skip
+                    .replace("position_m = [5.0", "f_number = 8.0\nposition_m = [5.0")
+                    .replace("step_s = 10.0", f"step_s = {step_s}"))  # fmt: skip
     arguments = [
         "predict",
         str(file),
@@ -518,7 +595,7 @@ def test_command_plans_a_scene_and_its_veil_is_that_of_a_final_render(tmp_path, 
     assert data["better_position"]["camera"] == "A"
     text = page.read_text("utf-8")
     assert set(re.findall(r"https?://[^\s\"'<>]+", text)) <= {"http://www.w3.org/2000/svg"}
-    # once more from the kept pictures: the same to the last digit
+    # again from the cached pictures: identical
     assert run(arguments) == 0
     assert capsys.readouterr().out == first
 
@@ -556,17 +633,17 @@ def test_bad_flags_for_a_scene(flags, words, tmp_path, capsys):
     file = tmp_path / "s.toml"
     file.write_text(SCENE)
     assert run(["predict", str(file), *flags]) == 2
-    told = capsys.readouterr().err
-    assert words in told
-    assert told.count("\n") == 1
+    reported = capsys.readouterr().err
+    assert words in reported
+    assert reported.count("\n") == 1
 
 
-def test_a_damaged_cache_and_a_lens_that_is_not_there_are_told(tmp_path, capsys):
+def test_a_cache_of_another_kind_and_a_lens_that_is_not_there_are_reported(tmp_path, capsys):
     file, cache = tmp_path / "s.toml", tmp_path / "s.npz"
     file.write_text(SCENE)
     cache.write_bytes(b"PK nothing")
     assert run(["predict", str(file), "--cache", str(cache)]) == 2
-    assert "is damaged" in capsys.readouterr().err
+    assert "holds no flares" in capsys.readouterr().err
     file.write_text(SCENE.replace("triplet-pestrecov", "no-such-lens"))
     assert run(["predict", str(file)]) == 2
     assert f"{file}: camera A: " in capsys.readouterr().err

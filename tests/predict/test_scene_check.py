@@ -1,4 +1,4 @@
-"""`flarewright scene check` refuses what `flarewright predict` refuses, each mistake with its camera and key."""
+"""`flarewright scene check` reports the errors of `flarewright predict`, each with its camera and key."""
 
 import json
 import subprocess
@@ -7,11 +7,11 @@ import sys
 import pytest
 
 from flarewright.cli.app import run
-from flarewright.cli.predict_flares import camera_project
-from flarewright.io.ghost_model_file import write_ghost_model, write_tracks
-from flarewright.model.ghost_model import GhostModel, Halo, Reference
-from flarewright.model.ghost_tracks import Tracks
-from flarewright.model.scene import Lamp, SceneCamera
+from flarewright.io.measurement.ghost_model_file import write_ghost_model, write_tracks
+from flarewright.model.measurement.ghost_model import GhostModel, Halo, Reference
+from flarewright.model.measurement.ghost_tracks import Tracks
+from flarewright.model.project.scene import Lamp, SceneCamera
+from flarewright.workflow.lens_flares import camera_project
 
 LIT = Reference(luminance_cd_m2=1e5, solid_angle_sr=1e-4)
 
@@ -49,7 +49,7 @@ WRONG = {
     "no file": (measured("nope.json"), "model", "nope.json does not exist"),
     "half a file": (measured("cut.json"), "model", "cut.json is not valid JSON"),
     "another file": (measured("tracks.json"), "model", "tracks.json is no ghost model: a camera's model is"),
-    "no light": (measured("unlit.json"), "model", "does not tell luminance_cd_m2 and solid_angle_sr"),
+    "no light": (measured("unlit.json"), "model", "does not know luminance_cd_m2 and solid_angle_sr"),
     "nothing left": (measured("whole.json", "around_light = 9"), "around_light", "around_light 9 is no part"),
     "other sensor": (measured("whole.json", "sensor_mm = [36, 24]"), "sensor_mm", "give sensor_mm = [36, 20.25]"),
     "no lens": ('lens = "nope"', "lens", "'nope' is neither a shipped lens nor a file"),
@@ -65,13 +65,13 @@ def test_check_refuses_what_predict_refuses(case, scene, capsys):
     lines, key, words = WRONG[case]
     file = scene(lines)
     assert run(["scene", "check", str(file)]) == 2
-    told = capsys.readouterr().err
-    assert f"scene.toml: cameras[0].{key} (A): " in told
-    assert words in told
+    reported = capsys.readouterr().err
+    assert f"scene.toml: cameras[0].{key} (A): " in reported
+    assert words in reported
     assert run(["predict", str(file)]) == 2
-    told = capsys.readouterr().err
-    assert "camera A: " in told
-    assert words in told
+    reported = capsys.readouterr().err
+    assert "camera A: " in reported
+    assert words in reported
 
 
 @pytest.mark.parametrize("camera", ['lens = "heliar-tronnier"\n', measured("whole.json")])
@@ -101,7 +101,7 @@ def test_pixels_of_a_scene_are_square(sensor):
     assert camera.pixel_aspect == pytest.approx(1.0, rel=0.02)
 
 
-def test_everything_that_is_wrong_with_all_cameras_is_told_at_once(scene, capsys):
+def test_everything_that_is_wrong_with_all_cameras_is_reported_at_once(scene, capsys):
     file = scene(
         measured("unlit.json", "around_light = 9\nsensor_mm = [36, 24]"),
         'lens = "heliar-tronnier"',
@@ -110,15 +110,15 @@ def test_everything_that_is_wrong_with_all_cameras_is_told_at_once(scene, capsys
         measured("whole.json"),
     )
     assert run(["scene", "check", str(file), "--json"]) == 2
-    told = json.loads(capsys.readouterr().out)
-    assert told["usable"] is False
-    assert [one.partition(": ")[0] for one in told["problems"]] == [
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["usable"] is False
+    assert [one.partition(": ")[0] for one in reported["problems"]] == [
         "cameras[0].model (A)", "cameras[0].around_light (A)", "cameras[0].sensor_mm (A)", "cameras[2].zoom (C)",
         "cameras[2].f_number (C)", "cameras[2].coating (C)", "cameras[3].lens (D)",
     ]  # fmt: skip
 
 
-def test_every_finding_in_a_lens_file_is_told_with_its_camera(scene, tmp_path, capsys):
+def test_every_finding_in_a_lens_file_is_reported_with_its_camera(scene, tmp_path, capsys):
     (tmp_path / "own.toml").write_text('schema_version = 1\nname = "own"\nf_number = "fast"\nrows = "none"\n')
     assert run(["scene", "check", str(scene('lens = "own.toml"')), "--json"]) == 2
     problems = json.loads(capsys.readouterr().out)["problems"]
@@ -126,17 +126,17 @@ def test_every_finding_in_a_lens_file_is_told_with_its_camera(scene, tmp_path, c
     assert all(one.startswith("cameras[0].lens (A): ") and "own.toml: " in one for one in problems)
 
 
-def test_a_lamp_in_a_lens_is_told_before_anything_is_drawn(scene, capsys):
+def test_a_lamp_in_a_lens_is_reported_before_anything_is_drawn(scene, capsys):
     file = scene('lens = "heliar-tronnier"', lamp="[0.01, 0.1, 0]")
     assert run(["scene", "check", str(file)]) == 2
-    told = capsys.readouterr().err
-    assert "lights[0] (lamp) and cameras[0] (A): a light" in told
-    assert "stands in or right at the lens" in told
-    # its distance is nothing to a measured flare
+    reported = capsys.readouterr().err
+    assert "lights[0] (lamp) and cameras[0] (A): a light" in reported
+    assert "stands in or right at the lens" in reported
+    # the distance does not matter for a measured flare
     assert run(["scene", "check", str(scene(measured("whole.json"), lamp="[0.01, 0.1, 0]"))]) == 0
 
 
-def test_every_light_without_visible_light_is_told(scene, capsys):
+def test_every_light_without_visible_light_is_reported(scene, capsys):
     file = scene(measured("whole.json"))
     infrared = 'spectrum = { kind = "table", wavelength_nm = [1200, 1300], power = [1, 1] }\n'
     more = "".join(

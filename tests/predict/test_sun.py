@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flarewright.errors import FlarewrightError
-from flarewright.model.scene import Site
+from flarewright.model.project.scene import Site
 from flarewright.predict.sun import sun_illuminance, sun_path
 
 pytest.importorskip("astral")
@@ -44,7 +44,7 @@ def low_precision(latitude_deg, longitude_deg, time):
 
 
 def refraction_deg(altitude_deg):
-    """Return by how much the air lifts a body at a true altitude (Saemundsson 1986), for 1010 hPa and 10 degrees."""
+    """Return the refraction at a true altitude (Saemundsson 1986), for 1010 hPa and 10 degrees."""
     return 1.02 / 60.0 / np.tan(np.radians(altitude_deg + 10.3 / (altitude_deg + 5.11)))
 
 
@@ -69,7 +69,7 @@ def test_equinox_and_solstice_of_2024():
     # declination 0: seen from the equator the sun rises due east and stays there
     azimuth, _ = at(0.0, 0.0, datetime(2024, 3, 20, 3, 6, tzinfo=UTC))
     assert azimuth[0] == pytest.approx(90.0, abs=0.01)
-    # on the tropic, where it is noon: 8 h 51 min less the equation of time, -1 min 48 s, in degrees west
+    # on the tropic at noon: 8 h 51 min less the equation of time, -1 min 48 s, in degrees west
     _, elevation = at(23.4362, -(8.85 * 15.0 - 1.8 / 60.0 * 15.0), datetime(2024, 6, 20, 20, 51, tzinfo=UTC))
     assert elevation[0] > 89.95
 
@@ -80,12 +80,12 @@ def test_equinox_and_solstice_of_2024():
 def test_transit_at_greenwich_at_the_extremes_of_the_equation_of_time(transit):
     """The Astronomical Almanac: +16 min 25 s on November 3, -14 min 14 s on February 11."""
     azimuth, _ = at(51.4779, 0.0, transit)
-    # the azimuth runs half a degree in a minute and a half
+    # the azimuth changes half a degree in a minute and a half
     assert azimuth[0] == pytest.approx(180.0, abs=0.05)
 
 
 def test_clear_sky():
-    """100 klx overhead (103 klx: 127.5 exp(-0.21)), nothing at night, and never brighter when lower."""
+    """100 klx overhead (103 klx: 127.5 exp(-0.21)), 0 at night, and less at lower elevations."""
     assert sun_illuminance(90.0) == pytest.approx(127500.0 * np.exp(-0.21), rel=1e-3)
     assert sun_illuminance(-0.1) == 0.0
     assert (np.diff(sun_illuminance(np.linspace(0.0, 90.0, 181))) > 0.0).all()
@@ -93,6 +93,6 @@ def test_clear_sky():
     assert sun_illuminance(30.0) == pytest.approx(127500.0 * np.exp(-0.42), rel=5e-3)
 
 
-def test_a_year_beyond_what_is_known_is_told():
+def test_a_year_beyond_what_is_known_is_reported():
     with pytest.raises(FlarewrightError, match="1900 to 2100"):
         at(0.0, 0.0, datetime(3000, 1, 1, tzinfo=UTC))

@@ -1,14 +1,14 @@
-"""Gauss' wavelengths: polynomials exactly, and coated flare as 31 even wavelengths have it."""
+"""Gauss wavelengths: exact for polynomials, and for coated flare equal to 31 even wavelengths."""
 
 import numpy as np
 import pytest
 
 from flarewright.errors import FlarewrightError
 from flarewright.model import D65, BlackBody, Camera, Everywhere, Light, Lines, Output, Project, Quality, QuarterWave
-from flarewright.model.light import Tabulated
-from flarewright.optics.cie1931 import cie_1931
-from flarewright.optics.color import luminance_weights
-from flarewright.optics.spectrum import band_weights, spectral_power
+from flarewright.model.project.light import Tabulated
+from flarewright.optics.colour.cie1931 import cie_1931
+from flarewright.optics.colour.rgb import luminance_weights
+from flarewright.optics.colour.spectrum import band_weights, spectral_power
 from flarewright.predict.lens_flare import luminous, statistics_quality
 from flarewright.predict.wavelengths import luminous_lines
 from flarewright.render.render import render
@@ -67,7 +67,7 @@ def test_narrow_and_strong_tables_have_their_lines():
 
 
 def test_flare_of_a_quarter_wave_is_that_of_31_even_wavelengths():
-    """Three even ones make it brighter: they stand where this coating reflects most."""
+    """Three even wavelengths make it brighter: they are where this coating reflects most."""
     project = Project(
         lens="heliar-tronnier", f_number=5.6, coating=Everywhere(coating=QuarterWave(center_wavelength_nm=550.0)),
         lights=(Light(field_deg=(12.0, 3.0)),), camera=Camera(size_px=(96, 64), sensor_mm=(36.0, 24.0)),

@@ -1,6 +1,6 @@
-"""Flux by counting rays on a dense, even grid of the pupil: no mesh, no clipping, no raster.
+"""Flux from rays on a dense, regular grid of the pupil: no mesh, no clipping, no raster.
 
-It shares the ray tracer with the renderer (the oracle of tests/physics judges that one) and nothing else.
+It shares only the ray tracer with the renderer, which the oracle of tests/physics tests.
 """
 
 from __future__ import annotations
@@ -10,21 +10,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from flarewright.model import Camera, Iris, Light, Lines, Output, Project, Quality
-from flarewright.optics.bundle import trace_points
-from flarewright.optics.iris import transmission
-from flarewright.optics.paths import LightPath, direct_path, ghost_path
-from flarewright.optics.region import front_box
-from flarewright.render.opening import make_opening
-from flarewright.render.prepare import settle
+from flarewright.optics.lens.paths import LightPath, direct_path, ghost_path
+from flarewright.optics.pupil.iris import transmission
+from flarewright.optics.rays.bundle import trace_points
+from flarewright.optics.rays.pupil_region import front_box
 from flarewright.render.render import Rendering, render
-from flarewright.render.shot import Shot
-from flarewright.render.shots import make_shots
+from flarewright.render.scene.opening import make_opening
+from flarewright.render.scene.resolve import resolve_project
+from flarewright.render.scene.shot import Shot
+from flarewright.render.scene.shots import make_shots
 
 D_LINE = Lines(lines=((587.56, 1.0),))
 
 
 def scene(lens: str, *lights: Light, f_number: float | None = 8.0, iris: Iris | None = None, **parts) -> Project:
-    """Return a project of rays alone: parts of camera, quality and output by their own names."""
+    """Return a project of rays alone; keyword arguments are fields of camera, quality and output."""
     parts = {"ringing": "off", **parts}
 
     def pick(model):
@@ -47,8 +47,8 @@ def mono(field_deg: tuple[float, float], intensity: float = 1.0) -> Light:
 
 
 def shots_of(project: Project) -> tuple[Shot, ...]:
-    """Return the lights of a project as the passes see them."""
-    settled = settle(project)
+    """Return the shots of a project, as the passes use them."""
+    settled = resolve_project(project)
     return make_shots(settled, make_opening(settled, None))
 
 
@@ -69,7 +69,7 @@ def picture(layer, size_px: tuple[int, int]) -> np.ndarray:
 
 
 def layer_flux(layer, project: Project) -> np.ndarray:
-    """Integrate a layer over the sensor: one number a channel, mm^2 per unit irradiance."""
+    """Integrate a layer over the sensor: one number per channel, mm^2 per unit irradiance."""
     sensor, size = project.camera.sensor, project.camera.size_px
     area = sensor[0] / size[0] * sensor[1] / size[1]
     return layer.pixels.sum(axis=(0, 1), dtype=np.float64) * area
@@ -77,7 +77,7 @@ def layer_flux(layer, project: Project) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Counted:
-    """Flux per unit irradiance facing the light, all of it and the part that lands on the sensor, mm^2."""
+    """Flux per unit irradiance facing the light, in total and on the sensor, mm^2."""
 
     flux: float
     on_sensor: float
@@ -85,9 +85,10 @@ class Counted:
 
 
 def count(shot: Shot, path: LightPath, iris: Iris, *, w: int = 0, n: int = 240) -> Counted:
-    """Trace n x 2n rays over the accepted part of the pupil, both halves, and add what passes.
+    """Trace n x 2n rays over the accepted part of the pupil, both halves, and add the flux that passes.
 
-    A look at the whole pupil finds that part. What is left of the grid is its ragged border, below 2e-4 of the flux.
+    A coarse grid over the whole pupil finds that part. The error of the fine grid is its ragged border, below 2e-4 of
+    the flux.
     """
     packed, tilt = shot.packed, shot.incidence.tilt
     box = front_box(packed, tilt)
@@ -128,12 +129,12 @@ def count(shot: Shot, path: LightPath, iris: Iris, *, w: int = 0, n: int = 240) 
 
 
 def _turned(x, y, axes):
-    """Points as seen along the axes of a light: columns are fast where arrays of pairs are not."""
+    """Return points along the axes of a light; columns are faster than arrays of pairs."""
     return x * axes[0, 0] + y * axes[1, 0], x * axes[0, 1] + y * axes[1, 1]
 
 
 def _grid(box, n):
-    """Cell centres of n x 2n cells of a box, the area of a cell, and its sides."""
+    """Return the centres of n x 2n cells of a box, the area of a cell, and its sides."""
     size = np.array([(box[1] - box[0]) / n, (box[3] - box[2]) / (2 * n)])
     x = box[0] + size[0] * (np.arange(n) + 0.5)
     y = box[2] + size[1] * (np.arange(2 * n) + 0.5)
@@ -143,7 +144,7 @@ def _grid(box, n):
 
 def path_of(project: Project, name: str) -> LightPath:
     """Return the path of a layer's name: "ghost.4-1", or "direct"."""
-    lens = settle(project).lens
+    lens = resolve_project(project).lens
     if name == "direct":
         return direct_path(lens)
     j, i = (int(part) for part in name.removeprefix("ghost.").split("-"))

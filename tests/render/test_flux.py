@@ -1,4 +1,4 @@
-"""Every photon accounted for: the sum of a layer is the flux of its rays, at any size, sensor, grid and iris."""
+"""Conservation of flux: the sum of a layer is the flux of its rays, for any picture size, sensor, grid and iris."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from PIL import Image
+from prescriptions import ghost_table_of
 from pupil_sum import D_LINE, by_name, count, layer_flux, layers_of, mono, path_of, picture, scene, shots_of
 
 from flarewright.model import D65, Everywhere, Iris, Light, Output, Project, Quality, QuarterWave
-from flarewright.optics.ghosts import ghost_table
-from flarewright.optics.paths import ghost_paths
-from flarewright.optics.region import find_region
-from flarewright.render.ghosts import render_ghosts
-from flarewright.render.prepare import load_lens
+from flarewright.optics.lens.paths import ghost_paths
+from flarewright.optics.rays.pupil_region import find_region
+from flarewright.render.ghosts.ghost_pass import render_ghosts
 from flarewright.render.render import render
+from flarewright.render.scene.resolve import load_lens
 
 FLUX = 2e-3
 FLOOR = 1e-4
@@ -24,7 +24,7 @@ FLOOR = 1e-4
 ROUND, SIX, ROUNDED_FIVE = Iris(), Iris(blades=6), Iris(blades=5, rounding=0.4, rotation_deg=10.0)
 
 HOLDS = (1200.0, 1200.0)
-"""A sensor that holds every ghost of these lenses at f/8; what it does not is compared on the sensor."""
+"""A sensor that contains every ghost of these lenses at f/8; flux outside it is excluded from the comparison."""
 
 
 def monochrome(project) -> np.ndarray:
@@ -34,8 +34,8 @@ def monochrome(project) -> np.ndarray:
 
 
 def counted(project, rays: int | None = None) -> dict:
-    """Rays counted for every path; 170 a side know the flux of plain ghosts to 4e-4, 120 to 7e-4."""
-    # thin rings take more
+    """Count rays for every path; 170 per side give the flux of plain ghosts to 4e-4, 120 to 7e-4."""
+    # thin rings need more
     rays = rays or (240 if project.lens == "double-gauss-tronnier" else 170)
     camera = project.camera.replace(size_px=(64, 36))
     lit = project.replace(camera=camera, quality=Quality(wavelengths=1), output=Output())
@@ -44,7 +44,7 @@ def counted(project, rays: int | None = None) -> dict:
 
 @lru_cache(maxsize=16)
 def _counted(json: str, rays: int) -> dict:
-    """Count once what is lit alike on the same sensor, whatever its pixels."""
+    """Count once per light and sensor, for any number of pixels."""
     project = Project.model_validate_json(json)
     shot = shots_of(project)[0]
     lens = load_lens(project.lens)
@@ -52,7 +52,7 @@ def _counted(json: str, rays: int) -> dict:
 
 
 def complaints(project, truth: dict, floor: float = FLOOR, tolerance: float = FLUX) -> list[str]:
-    """Compare every layer with the rays that land on the sensor; relative to the ghost's own flux."""
+    """Compare every layer with the rays that land on the sensor, relative to the ghost's flux."""
     layers, rgb = layers_of(project), monochrome(project)
     brightest = max(c.flux for c in truth.values())
     wrong = []
@@ -71,7 +71,7 @@ def ghosts_of(lens: str, light: Light, **parts):
 
 
 def slow(*values):
-    """Repeat a test on more lenses where time allows."""
+    """Repeat a test on more lenses in slow runs."""
     return pytest.param(*values, marks=pytest.mark.slow)
 
 
@@ -80,7 +80,7 @@ def slow(*values):
 
 @pytest.mark.parametrize("lens", ["heliar-tronnier", slow("tessar-brendel"), slow("double-gauss-tronnier")])
 def test_each_layer_holds_its_flux_whatever_the_picture(lens):
-    """On a sensor that holds all, one of 36 mm and a square one; small, odd and ordinary pictures; two tolerances."""
+    """A sensor that contains all, one of 36 mm and a square one; small, odd and ordinary sizes; two tolerances."""
     wide = ghosts_of(lens, mono((8.0, 5.0)), size_px=(64, 36), sensor_mm=HOLDS)
     truth = counted(wide)
     assert all(c.on_sensor == pytest.approx(c.flux, rel=1e-3) for c in truth.values() if c.flux > 0.0)
@@ -94,7 +94,7 @@ def test_each_layer_holds_its_flux_whatever_the_picture(lens):
     ("lens", "size", "sensor"),
     [
         ("tessar-brendel", (333, 187), (36.0, 20.25)),
-        ("tessar-brendel", (101, 99), (100.0, 40.0)),
+        slow("tessar-brendel", (101, 99), (100.0, 40.0)),
         slow("heliar-tronnier", (333, 187), (36.0, 20.25)),
         slow("double-gauss-tronnier", (333, 187), (36.0, 20.25)),
         slow("heliar-tronnier", (101, 99), (100.0, 40.0)),
@@ -108,7 +108,7 @@ def test_each_layer_holds_what_lands_on_the_sensor(lens, size, sensor):
 
 @pytest.mark.slow
 def test_each_layer_holds_its_flux_behind_blades():
-    """The iris lets the same rays through that `optics.iris.transmission` does."""
+    """The iris passes the same rays as `optics.pupil.iris.transmission`."""
     project = ghosts_of("tessar-brendel", mono((8.0, 5.0)), iris=SIX, size_px=(160, 90), sensor_mm=(360.0, 202.5))
     assert complaints(project, counted(project)) == []
 
@@ -120,7 +120,7 @@ def test_each_layer_holds_its_flux_behind_blades():
         ("tessar-brendel", ROUNDED_FIVE, 8.0, (8.0, 5.0), (320, 180), (360.0, 202.5)),
         slow("double-gauss-tronnier", ROUNDED_FIVE, 8.0, (-14.0, 3.0), (101, 99), (100.0, 100.0)),
         slow("tessar-brendel", ROUND, 8.0, (8.0, 5.0), (160, 90), HOLDS),
-        ("heliar-tronnier", ROUND, 32.0, (1.0, 0.75), (300, 300), (60.0, 60.0)),
+        slow("heliar-tronnier", ROUND, 32.0, (1.0, 0.75), (300, 300), (60.0, 60.0)),
         slow("heliar-tronnier", ROUND, 64.0, (0.5, 0.4), (300, 300), (60.0, 60.0)),
     ],
 )
@@ -132,9 +132,9 @@ def test_every_edge_is_cut_exactly(lens, iris, f_number, field, size, sensor):
 @pytest.mark.parametrize(
     ("lens", "field", "f_number", "rays"),
     [
-        ("flektogon-35", (10.0, 5.0), 2.8, 120),
-        ("takumar-50-f1.4", (8.0, 5.0), 1.4, 90),
-        # one of its ghosts is a ring so thin that few rays do not know its light
+        slow("flektogon-35", (10.0, 5.0), 2.8, 120),
+        slow("takumar-50-f1.4", (8.0, 5.0), 1.4, 90),
+        # one of its ghosts is a ring so thin that few rays do not determine its flux
         ("double-gauss-tronnier", (0.0, 0.0), 2.1, 170),
         slow("flektogon-35", (10.0, 5.0), 2.8, 240),
         slow("takumar-50-f1.4", (8.0, 5.0), 1.4, 240),
@@ -142,7 +142,7 @@ def test_every_edge_is_cut_exactly(lens, iris, f_number, field, size, sensor):
     ],
 )
 def test_light_beside_rays_that_end_is_drawn(lens, field, f_number, rays):
-    """Where no rim bounds a ghost but rays that miss a surface do, and where T falls steeply before them."""
+    """Ghosts bounded by rays that miss a surface, before which T falls steeply, instead of by an edge."""
     project = ghosts_of(lens, mono(field), f_number=f_number, size_px=(240, 160), sensor_mm=HOLDS)
     assert complaints(project, counted(project, rays)) == []
 
@@ -151,7 +151,7 @@ def test_light_beside_rays_that_end_is_drawn(lens, field, f_number, rays):
     ("lens", "field", "f_number"),
     [
         ("heliar-tronnier", (8.0, 5.0), 8.0),
-        ("double-gauss-tronnier", (8.0, 5.0), 8.0),
+        slow("double-gauss-tronnier", (8.0, 5.0), 8.0),
         slow("takumar-50-f1.4", (8.0, 5.0), 1.4),
     ],
 )
@@ -159,7 +159,7 @@ def test_layers_agree_with_the_ghost_table(lens, field, f_number):
     """Two ways through the program: the picture and the analysis."""
     project = ghosts_of(lens, mono(field), f_number=f_number, size_px=(240, 160), sensor_mm=HOLDS)
     layers, rgb = layers_of(project), monochrome(project)
-    table = ghost_table(load_lens(lens), field, f_number=f_number)
+    table = ghost_table_of(load_lens(lens), field, f_number=f_number)
     for row in table.ghosts:
         if row.throughput_mm2 > FLOOR * table.ghosts[0].throughput_mm2:
             drawn = layer_flux(layers[f"ghost.{row.first_reflection}-{row.second_reflection}"], project) / rgb
@@ -169,7 +169,7 @@ def test_layers_agree_with_the_ghost_table(lens, field, f_number):
 @pytest.mark.parametrize("mode", ["passes", "ghosts"])
 @pytest.mark.parametrize("lens", ["heliar-tronnier", slow("tessar-brendel")])
 def test_the_pass_holds_all_ghosts(lens, mode):
-    """Drawn together, faint ghosts at lower resolution, or drawn one by one."""
+    """Drawn together, with faint ghosts at lower resolution, or one by one."""
     project = scene(lens, mono((8.0, 5.0)), layers=mode, starburst=False, size_px=(320, 180), sensor_mm=(72.0, 40.5))
     drawn = layer_flux(layers_of(project)["ghosts"], project) / monochrome(project)
     truth = counted(project)
@@ -198,19 +198,19 @@ def test_colours_hold_the_flux_of_every_wavelength(bridge, waves):
     weights = shot.weights(shot.packed.wavelengths_nm)
     for name in ("ghost.7-6", "ghost.4-2", "ghost.2-0"):
         path = path_of(project, name)
-        # a wavelength of many need not be known as well as one of five
+        # with many wavelengths each needs less accuracy than with five
         rays = 90 if bridge else 170
         flux = np.array([count(shot, path, project.iris, w=w, n=rays).on_sensor for w in range(len(weights))])
         expected = flux @ weights
         error = np.abs(layer_flux(layers[name], project) - expected)
-        # the grid serves all wavelengths, so its own error adds to that of the colours between them
+        # the grid serves all wavelengths, so its error adds to that of the colours between them
         limit = 2e-2 if bridge else 1.5 * FLUX
         assert (error < limit * np.abs(expected).max()).all(), name
 
 
 @pytest.mark.parametrize(("mode", "limit"), [("draft", 0.025), ("final", 0.02)])
 def test_few_wavelengths_tell_the_colours_of_single_films(mode, limit):
-    """A film's reflectance is near 0 at 550 nm and bends there; lines between 7 wavelengths do not."""
+    """The reflectance of a film is near 0 at 550 nm and curved there; linear interpolation would miss that."""
     parts = {"layers": "passes", "starburst": False, "mode": mode, "size_px": (96, 54), "sensor_mm": (72.0, 40.5)}
     film = Everywhere(coating=QuarterWave(center_wavelength_nm=550.0))
     found = {}
@@ -228,7 +228,7 @@ def test_few_wavelengths_tell_the_colours_of_single_films(mode, limit):
 
 @pytest.mark.parametrize("mode", ["draft", "final"])
 def test_the_brightest_get_layers_of_their_own(mode):
-    """Asked for three, one gets the three that carry most of the light, brightest first."""
+    """`brightest=3` returns the three ghosts with the most light, brightest first."""
     parts = {"layers": "ghosts", "starburst": False, "mode": mode, "size_px": (160, 90), "sensor_mm": HOLDS}
     every = layers_of(scene("heliar-tronnier", mono((8.0, 5.0)), **parts))
     flux = {name: layer.pixels[..., 0].sum(dtype=float) for name, layer in every.items() if name.startswith("ghost.")}
@@ -247,19 +247,19 @@ def test_a_smaller_sensor_is_a_crop_of_a_larger_one(lens):
     small = scene(lens, mono((8.0, 5.0)), size_px=(128, 72), sensor_mm=(32.0, 18.0), **parts)
     whole, part = picture(layers_of(big)["ghosts"], (256, 144)), picture(layers_of(small)["ghosts"], (128, 72))
     crop = whole[36:108, 64:192]
-    # what lies outside is not refined, so grids differ there and at the border
+    # the outside is not refined, so grids differ there and at the border
     assert np.abs(part - crop).sum() < 5e-3 * np.abs(crop).sum()
     assert part.sum() == pytest.approx(crop.sum(), rel=1e-3)
 
 
 def test_tiles_of_the_sensor_add_up_to_the_whole():
-    """Shift the axis out of the picture: four quarters drawn by themselves are the picture."""
+    """Four quarters, drawn separately by shifting the axis out of the picture, add up to the picture."""
     project = ghosts_of("double-gauss-tronnier", mono((8.0, 5.0)), size_px=(128, 96), sensor_mm=(64.0, 48.0))
     (shot,) = shots_of(project)
     paths = ghost_paths(load_lens(project.lens))
     whole = picture(render_ghosts([shot], paths, project.quality, singles=None).total, (128, 96))
 
-    class Tile(type(shot)):  # looks as far as the whole picture does
+    class Tile(type(shot)):  # with the view radius of the whole picture
         view_radius = shot.view_radius
 
     for left in (0, 64):
@@ -278,7 +278,7 @@ def test_tiles_of_the_sensor_add_up_to_the_whole():
 
 @pytest.mark.parametrize("lens", ["heliar-tronnier", "tessar-brendel"])
 def test_a_fine_picture_averaged_is_the_coarse_one(lens):
-    """In the mean (L1) within 0.5 %; away from caustics and edges, where a block is even, pixel for pixel."""
+    """On average (L1) within 0.5 %; away from caustics and edges, where a block is uniform, pixel for pixel."""
     fine = scene(lens, mono((8.0, 5.0)), layers="ghosts", starburst=False, size_px=(512, 288))
     coarse = scene(lens, mono((8.0, 5.0)), layers="ghosts", starburst=False, size_px=(128, 72))
     a = picture(layers_of(fine)["ghosts"], (512, 288))[..., 1].reshape(72, 4, 128, 4)
@@ -313,7 +313,7 @@ def test_threads_do_not_change_a_byte(mode, layers):
 
 
 def beauty_of(lens: str, field, size=(160, 90), **parts):
-    """A picture with its direct image, where it has one in view."""
+    """Return a picture with its direct image, where that lies in the picture."""
     project = scene(lens, mono(field), size_px=size, layers="passes", **parts)
     return picture(by_name(render(project))["beauty"], size)
 
@@ -331,16 +331,16 @@ def test_mirrored_light_makes_the_mirrored_picture(lens, mode):
 
 @pytest.mark.parametrize("mode", ["draft", "final"])
 def test_a_quarter_turn_of_the_light_turns_the_picture(mode):
-    """A square sensor knows no up; a round iris neither."""
+    """A square sensor and a round iris have no preferred direction."""
     a = beauty_of("heliar-tronnier", (8.0, 5.0), (96, 96), sensor_mm=(30.0, 30.0), mode=mode)
-    # (8, 5) a quarter turn counter-clockwise is (-5, 8)
+    # (8, 5) rotated by a quarter turn counter-clockwise is (-5, 8)
     b = beauty_of("heliar-tronnier", (-5.0, 8.0), (96, 96), sensor_mm=(30.0, 30.0), mode=mode)
     assert np.abs(np.rot90(a) - b).sum() < 2e-5 * np.abs(a).sum()
 
 
 @pytest.mark.parametrize("mode", ["draft", "final"])
 def test_blades_turn_with_the_picture(mode):
-    """Four blades after a quarter turn are the same four blades; six are six turned by 30 degrees."""
+    """Four blades are the same after a quarter turn; six equal six rotated by 30 degrees."""
     parts = {"sensor_mm": (30.0, 30.0), "mode": mode}
     a = beauty_of("heliar-tronnier", (8.0, 5.0), (96, 96), iris=SIX, **parts)
     b = beauty_of("heliar-tronnier", (-5.0, 8.0), (96, 96), iris=Iris(blades=6, rotation_deg=90.0), **parts)
@@ -376,7 +376,7 @@ def test_two_lights_are_the_sum_of_two_renders(mode):
 
 
 def test_the_f_number_sets_the_light():
-    """On the axis: E ~ 1 / N^2, and pi (f / 2N)^2 T exactly in the limit of small pupils."""
+    """On the axis: E ~ 1 / N^2, and exactly pi (f / 2N)^2 T in the limit of small pupils."""
     found = {}
     for n in (4.0, 8.0, 16.0, 32.0):
         summary = render(scene("heliar-tronnier", mono((0.0, 0.0)), f_number=n, size_px=(16, 9), mode="draft")).summary
@@ -392,14 +392,14 @@ def test_the_f_number_sets_the_light():
 @pytest.mark.parametrize("iris", [ROUND, SIX])
 @pytest.mark.parametrize("lens", ["heliar-tronnier", "double-gauss-tronnier"])
 def test_the_starburst_holds_the_direct_flux(lens, iris):
-    """Rays counted on the direct path are what the starburst's pixels add up to, when the sensor holds it."""
+    """The starburst's pixels add up to the rays counted on the direct path, if the sensor contains it."""
     project = scene(
         lens, mono((3.0, 2.0)), iris=iris, layers="passes", size_px=(600, 600), sensor_mm=(120.0, 120.0), mode="draft"
     )
     drawn = layer_flux(layers_of(project)["starburst"], project) / monochrome(project)
     (shot,) = shots_of(project)
     direct = count(shot, path_of(project, "direct"), iris)
-    # the wings fall off like 1 / r^3, so a little lies outside any sensor
+    # the wings fall off as 1 / r^3, so a little lies outside any sensor
     np.testing.assert_allclose(drawn, direct.flux, rtol=FLUX)
 
 
@@ -413,7 +413,7 @@ def test_a_starburst_outside_the_picture_leaves_it_dark():
 
 
 def test_draft_tends_to_exact_rays_near_the_axis():
-    """Matrices are the limit of rays: flux of the big ghosts against counted rays, as angle and opening shrink."""
+    """Matrices are the limit of rays: flux of large ghosts against counted rays, as angle and opening shrink."""
     errors = []
     for shrink in (0.25, 0.0625):
         parts = {
@@ -422,7 +422,7 @@ def test_draft_tends_to_exact_rays_near_the_axis():
         field = (4.0 * shrink, 3.0 * shrink)
         project = scene("heliar-tronnier", mono(field), mode="draft", **parts)
         draft, rgb, truth = layers_of(project), monochrome(project), counted(project, 120)
-        # rims other than the first surface's bound some ghosts for good; these are bounded by the iris
+        # surfaces other than the first always bound some ghosts; these are bounded by the iris
         big = [name for name, c in truth.items() if c.flux > 0.05 * max(c.flux for c in truth.values())]
         assert len(big) >= 10
         drawn = {name: layer_flux(draft[name], project)[1] / rgb[1] for name in big}
@@ -470,7 +470,7 @@ def test_a_mask_of_a_disc_is_the_round_iris(tmp_path, mode):
 
 @pytest.mark.parametrize("mode", ["draft", "final"])
 def test_a_half_black_mask_halves_the_light(tmp_path, mode):
-    """On the axis both halves of the iris carry the same."""
+    """On the axis both halves of the iris carry the same flux."""
     pytest.importorskip("PIL")
     whole = write_mask(tmp_path / "white.png", np.ones((64, 64)))
     half = write_mask(tmp_path / "half.png", np.repeat([[1.0], [0.0]], 32, axis=0) * np.ones((64, 64)))
@@ -494,7 +494,7 @@ def test_a_mask_darkens_the_direct_image_by_its_own_mean(tmp_path):
 @pytest.mark.parametrize("mode", ["draft", "final"])
 @pytest.mark.parametrize("turn", [90.0, 30.0])
 def test_a_turned_mask_is_a_mask_of_the_turned_image(tmp_path, mode, turn):
-    """Ghosts turn with the image, as the starburst does."""
+    """Ghosts rotate with the image, as the starburst does."""
     pytest.importorskip("PIL")
     parts = {"layers": "passes", "starburst": False, "mode": mode, "size_px": (160, 90)}
     at = (np.arange(256) + 0.5) / 128.0 - 1.0
@@ -503,7 +503,7 @@ def test_a_turned_mask_is_a_mask_of_the_turned_image(tmp_path, mode, turn):
     for baked in (0.0, turn):
         c, s = np.cos(np.radians(baked)), np.sin(np.radians(baked))
         along, across = c * x + s * y, c * y - s * x
-        # a triangle, its corners within the square however it is turned
+        # a triangle with its corners inside the square at any rotation
         far = np.max([-across, 0.866 * along + 0.5 * across, -0.866 * along + 0.5 * across], axis=0)
         iris = write_mask(tmp_path / f"{baked}.png", np.clip((0.48 - far) * 128.0 + 0.5, 0.0, 1.0))
         turned = iris.replace(rotation_deg=turn - baked)
@@ -515,7 +515,7 @@ def test_a_turned_mask_is_a_mask_of_the_turned_image(tmp_path, mode, turn):
     assert np.abs(picture(unturned["ghosts"], (160, 90)) - pictures[1]).sum() > 0.1 * pictures[1].sum()
 
 
-# --- what is left out is told
+# --- remarks on missing light
 
 
 def test_culling_leaves_out_what_it_says():
@@ -530,7 +530,7 @@ def test_culling_leaves_out_what_it_says():
 
 
 def test_a_path_that_passes_the_picture_by_is_no_light_in_it():
-    """The pre-pass says that nothing is seen; the rays agree."""
+    """The pre-pass finds nothing visible; the rays agree."""
     project = ghosts_of("heliar-tronnier", mono((20.0, 10.0)), size_px=(64, 36), sensor_mm=(8.0, 4.5))
     (shot,) = shots_of(project)
     far = 0
@@ -543,7 +543,7 @@ def test_a_path_that_passes_the_picture_by_is_no_light_in_it():
     assert replace(shot, size_px=(64, 36)).view_radius == pytest.approx(np.hypot(4.0, 2.25))
 
 
-def test_a_black_picture_is_told():
+def test_a_black_picture_has_a_remark():
     lit, dark = (
         render(
             Project(
@@ -556,12 +556,12 @@ def test_a_black_picture_is_told():
         )
         for value in (1.0, 0.0)
     )
-    told = [any("picture is black" in remark for remark in each.remarks) for each in (lit, dark)]
-    assert told == [False, True]
+    reported = [any("picture is black" in remark for remark in each.remarks) for each in (lit, dark)]
+    assert reported == [False, True]
 
 
-def test_an_iris_image_that_is_not_square_is_told(tmp_path):
-    told = []
+def test_an_iris_image_that_is_not_square_has_a_remark(tmp_path):
+    reported = []
     for size in ((48, 48), (64, 48)):
         Image.new("L", size, 255).save(tmp_path / "iris.png")
         made = Project(
@@ -573,6 +573,8 @@ def test_an_iris_image_that_is_not_square_is_told(tmp_path):
             quality={"mode": "draft"},
             output=Output(starburst=False),
         )
-        told.append([remark for remark in render(made).remarks if "stretched" in remark])
-    assert told[0] == []
-    assert told[1] == ["the iris image has 64x48 pixels and is stretched to the square around the iris; give a square"]
+        reported.append([remark for remark in render(made).remarks if "stretched" in remark])
+    assert reported[0] == []
+    assert reported[1] == [
+        "the iris image has 64x48 pixels and is stretched to the square around the iris; give a square"
+    ]

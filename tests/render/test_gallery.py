@@ -1,4 +1,4 @@
-"""The library in pictures: what ships is what its lenses and looks give."""
+"""The pictures of the library: shipped thumbnails equal what the lenses and looks render."""
 
 from io import BytesIO
 
@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flarewright.io.library import shipped
-from flarewright.io.look_file import shipped_looks
-from flarewright.io.thumbnails import SIZE_PX, thumbnail
+from flarewright.io.images.thumbnails import SIZE_PX, thumbnail
+from flarewright.io.lens.library import library_names
+from flarewright.io.project.look_file import shipped_looks
 from flarewright.render.gallery import card_picture, card_project, cards, light_place
 
 
 def test_every_lens_and_every_look_has_a_card_and_a_picture_that_ships():
     found = cards()
-    assert [card.name for card in found] == [*shipped(), *shipped_looks()]
+    assert [card.name for card in found] == [*library_names(), *shipped_looks()]
     for card in found:
         assert card.title
         assert card.caption
         with Image.open(BytesIO(thumbnail(card.kind, card.name))) as image:
             pixels = np.asarray(image.convert("RGB")).astype(float)
         assert pixels.shape == (SIZE_PX[1], SIZE_PX[0], 3)
-        # none is black, and none is white
+        # none is black or white
         assert 2.0 < pixels.mean() < 120.0
 
 
@@ -39,5 +39,5 @@ def test_pictures_that_ship_are_what_is_rendered(card):
     with Image.open(BytesIO(thumbnail(card.kind, card.name))) as image:
         kept = np.asarray(image.convert("RGB")).astype(float)
     drawn = card_picture(card, SIZE_PX).astype(float)
-    # JPEG's own noise is below 2 of 255
+    # JPEG's noise is below 2 of 255
     assert np.abs(drawn - kept).mean() < 2.0

@@ -1,4 +1,4 @@
-"""Where nothing marks a place a ghost is smooth: the grid that it is drawn on does not show."""
+"""Ghosts are smooth: the grid on which they are drawn is invisible."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from flarewright.render.render import render
 
 
 def departure(light: np.ndarray) -> tuple[float, float]:
-    """Rms and largest departure from the polynomial of sixth degree next to it, parts of the mean."""
+    """Return rms and largest departure from the best polynomial of sixth degree, relative to the mean."""
     y, x = (
         grid.ravel() for grid in np.meshgrid(*(np.linspace(-1.0, 1.0, side) for side in light.shape), indexing="ij")
     )

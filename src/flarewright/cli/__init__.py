@@ -1,7 +1,14 @@
-"""The command line.
+"""The command line: one module per command, which parses arguments, calls the program and prints.
 
-Here, before anything imports NumPy, its library of matrices is told to work on one thread: the program's own threads
-share the work, and others beside them would wait for more by spinning, a fifth of a core while the editor draws.
+Importing this package limits NumPy's linear algebra library to one thread, before anything imports NumPy. The program
+has its own threads, and idle library threads would spin: a fifth of a core while the editor draws.
+
+- `app`: `main` and `run`: the command tree, errors and exit codes
+- `common`: helpers of several commands: option values, output checks, remarks, JSON, progress bars
+- `option_record`: `with_options`, commands whose options are the fields of a record
+- `option_words`: placeholders of option values in help texts
+- `edit`, `gallery`, `looks`, `warm_up`: single commands
+- `design`, `lens`, `measure`, `predict`, `project`, `render`: groups of commands
 """
 
 import os

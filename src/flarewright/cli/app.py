@@ -1,4 +1,4 @@
-"""The command line: `flarewright COMMAND`. Commands import what they need when they run, so that help is instant."""
+"""The command tree `flarewright COMMAND`. Commands import their modules when they run, so that help is instant."""
 
 from __future__ import annotations
 
@@ -13,63 +13,55 @@ import typer
 
 from .. import __version__
 from ..errors import FlarewrightError
-from ..kernels.helpers import head_start
-from . import (
-    coating_list,
-    coating_plot,
-    design_benchmark,
-    design_colors,
-    design_edit,
-    design_identify,
-    design_scratch,
-    design_solve,
-    design_target,
-    edit,
-    gallery,
-    ghosts,
-    lens_check,
-    lens_convert,
-    lens_schema,
-    lens_show,
-    lenses,
-    looks,
-    measure_explain,
-    measure_replay,
-    measure_report,
-    measure_run,
-    measure_stages,
-    predict,
-    project_check,
-    project_init,
-    project_schema,
-    render,
-    scene_check,
-    scene_init,
-    scene_schema,
-    warm_up,
-)
+from ..kernels.jit.warmup_processes import head_start
+from . import edit, gallery, looks, warm_up
+from .common import end_as_interrupted
+from .design import benchmark as design_benchmark
+from .design import colors as design_colors
+from .design import edit as design_edit
+from .design import identify as design_identify
+from .design import scratch as design_scratch
+from .design import solve as design_solve
+from .design import target as design_target
+from .lens import check as lens_check
+from .lens import coating_list, coating_plot, lenses
+from .lens import convert as lens_convert
+from .lens import schema as lens_schema
+from .lens import show as lens_show
+from .measure import explain as measure_explain
+from .measure import replay as measure_replay
+from .measure import report as measure_report
+from .measure import run as measure_run
+from .measure import stages as measure_stages
 from .option_words import name_values
+from .predict import command as predict
+from .project import check as project_check
+from .project import init as project_init
+from .project import scene_check, scene_init, scene_schema
+from .project import schema as project_schema
+from .render import command as render
+from .render import ghosts_command as ghosts
 
-# what older releases of Typer say of a value
+# messages of older releases of Typer on option values
 _TYPES = {"is not a valid float": "is no number", "is not a valid integer": "is no whole number"}
-# of a file's mistakes so many are listed
-_TOLD = 20
+# largest number of errors of a file that are listed
+_REPORTED = 20
 
 app = typer.Typer(
     name="flarewright",
-    help="Lens flare as physics: choose a lens, say where the light is, get a layered linear picture.",
-    epilog="Begin with: flarewright lenses\n\nThen: flarewright render takumar-50-f1.4 --light -9,5 -o flare.exr",
+    help="Physical lens flare: choose a lens and a light, get a layered linear picture.",
+    epilog="Start with: flarewright lenses\n\nThen: flarewright render takumar-50-f1.4 --light -9,5 -o flare.exr",
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-lens_app = typer.Typer(help="Look at, check and convert lens files.")
+lens_app = typer.Typer(help="Show, check and convert lens files.")
 looks_app = typer.Typer(help="Looks: coatings, iris, dirt and colours together, for any lens and light.")
-coating_app = typer.Typer(help="Look at coatings: the standard ones, and what any coating reflects.")
+coating_app = typer.Typer(help="List standard coatings, and plot the reflectance of any coating.")
 project_app = typer.Typer(help="Project files: everything a render needs, in one TOML file.")
 scene_app = typer.Typer(help="Scene files: cameras and lights in space, for `flarewright predict`.")
-design_app = typer.Typer(help="Search a lens for the flare you want.")
+design_app = typer.Typer(help="Search lenses for a target flare.")
 measure_app = typer.Typer(help="Measure a real camera's flare and replay it.")
 
 app.command("render", epilog=render.EPILOG)(render.render)
@@ -111,7 +103,7 @@ design_app.command("move-stop")(design_edit.move_stop)
 design_app.command("benchmark", epilog=design_benchmark.EPILOG)(design_benchmark.benchmark)
 design_app.command("identify", epilog=design_identify.EPILOG)(design_identify.identify)
 measure_app.command("run", epilog=measure_run.RUN_EPILOG)(measure_run.run)
-measure_app.command("merge", epilog=measure_run.MERGE_EPILOG)(measure_run.merge)
+measure_app.command("merge", epilog=measure_run.MERGE_EPILOG)(measure_run.merge_command)
 measure_app.command("find", epilog=measure_stages.FIND_EPILOG)(measure_stages.find)
 measure_app.command("fit", epilog=measure_stages.FIT_EPILOG)(measure_stages.fit)
 measure_app.command("track", epilog=measure_stages.TRACK_EPILOG)(measure_stages.track)
@@ -131,16 +123,18 @@ def _version(wanted: bool) -> None:
 @app.callback()
 def _root(
     version: Annotated[
-        bool, typer.Option("--version", metavar="", callback=_version, is_eager=True, help="Tell it and end.")
+        bool,
+        typer.Option("--version", metavar="", callback=_version, is_eager=True, help="Print the version and exit."),
     ] = False,
 ) -> None:
-    del version  # The callback has told it.
+    del version  # The callback has printed it.
 
 
 def main() -> None:
-    """Run the program with the arguments of the process, and end it."""
-    # what imports make lives until the end: looking through it for garbage again and again finds none
+    """Run the program with the arguments of the process, and exit."""
+    # imported objects live until the end, so exclude them from garbage collection
     gc.set_threshold(100_000)
+    end_as_interrupted()
     sys.exit(run(sys.argv[1:]))
 
 
@@ -155,10 +149,12 @@ def run(arguments: Sequence[str]) -> int:
     Returns
     -------
     int
-        Exit code: 0 done, 2 a mistake that was told in one sentence on stderr, 130 interrupted.
+        Exit code: 0 success, 2 an error with one sentence on stderr, 130 interrupted.
     """
+    _open_closed_streams()
+    _check_threads()
     for stream in (sys.stdout, sys.stderr):
-        # A terminal without UTF-8 shows a question mark; it is no reason to fail.
+        # A terminal without UTF-8 shows a question mark instead of failing.
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     words = list(arguments)
@@ -172,14 +168,34 @@ def run(arguments: Sequence[str]) -> int:
         sys.stdout.flush()
         return code
     except BrokenPipeError:
-        # Whoever read our output went away (`| head`); the interpreter's last flush must not complain again.
+        # The reader of the output has exited (`| head`); the interpreter's last flush must not fail again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
 
 
+def _open_closed_streams() -> None:
+    """Discard the output of streams that the caller has closed (`2>&-`): Python has no object for them."""
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        if getattr(sys, name) is None:
+            with suppress(OSError):
+                # occupies the number, or the next file that is opened would receive what libraries print
+                if (null := os.open(os.devnull, os.O_WRONLY)) != number:
+                    os.dup2(null, number)
+                    os.close(null)
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 - stays open
+
+
+def _check_threads() -> None:
+    """Remove a number of threads that Numba cannot read, with one sentence instead of a warning with its source."""
+    text = os.environ.get("NUMBA_NUM_THREADS")
+    if text is not None and not (text.strip().isdecimal() and int(text) > 0):
+        del os.environ["NUMBA_NUM_THREADS"]
+        print(f"flarewright: NUMBA_NUM_THREADS is {text[:120]!r}, no whole number above 0: ignored", file=sys.stderr)
+
+
 def _show_gallery() -> None:
-    """Lay out the pictures that ship, and say where; without a place for them the help says enough."""
-    from ..io.state_folder import state_folder
+    """Write the gallery of shipped pictures and print its address; do nothing if it cannot be written."""
+    from ..io.files.state_folder import state_folder
 
     with suppress(FlarewrightError, OSError):
         page = gallery.shipped_gallery(state_folder() / "gallery")
@@ -187,19 +203,19 @@ def _show_gallery() -> None:
 
 
 def _traces(words: Sequence[str]) -> bool:
-    """Tell whether a command is one that traces rays, on as many cores as there are."""
+    """Return whether a command traces rays on all cores."""
     return words[0] in ("render", "ghosts") and not {"-h", "--help", "--threads"} & set(words)
 
 
 def _rings(words: Sequence[str]) -> bool:
-    """Tell whether a command surely draws rings in ghosts: a render of final quality, stopped down by blades."""
+    """Return whether a command certainly draws rings in ghosts: a final render, stopped down by blades."""
     flags = {word.split("=")[0] for word in words}
     others = {"--quality", "--ringing", "--iris-image", "--project"}
     return words[0] == "render" and "--fstop" in flags and not others & flags
 
 
 def _call(words: list[str]) -> int:
-    """Turn every expected end of a command into an exit code, with its one sentence."""
+    """Convert every expected end of a command to an exit code, with one sentence on stderr."""
     swallowed: list[object] = []
     try:
         with _keeping_interrupts(swallowed):
@@ -209,11 +225,11 @@ def _call(words: list[str]) -> int:
     except (KeyboardInterrupt, typer.Abort):
         code = 130
     except MemoryError:
-        return _fail(f"there is not enough memory for this; {_smaller(words)}")
+        return _fail(f"there is not enough memory for this; {_memory_advice(words)}")
     except BrokenPipeError:
         raise
     except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
+        where = f"{str(error.filename)[:200]}: " if error.filename else ""
         return _fail(f"{where}{error.strerror or error}")
     except SystemExit as end:
         # Typer's own answer to a broken pipe.
@@ -221,21 +237,20 @@ def _call(words: list[str]) -> int:
             raise BrokenPipeError from end
         raise
     except Exception as error:
-        # Usage errors come from Typer's copy of click or from click itself, by version; both can tell their message.
+        # Usage errors come from Typer's copy of click or from click itself, by version; both have a message.
         if hasattr(error, "format_message"):
             return _fail(_usage(error))
         if not swallowed:
             raise
         code = 130
     if code == 130:
-        more = ", and the same command goes on where it was" if _goes_on(words) else ""
-        print(f"flarewright: interrupted; nothing was left half-written{more}", file=sys.stderr)
+        print(f"flarewright: interrupted; nothing was left half-written{_resuming(words)}", file=sys.stderr)
     return code if isinstance(code, int) else 0
 
 
 @contextmanager
 def _keeping_interrupts(swallowed: list[object]) -> Iterator[None]:
-    """Note every Ctrl-C that ends in a call from C, where none goes on: a kernel that compiled is then left undone."""
+    """Record every Ctrl-C swallowed by a call from C, which Python cannot raise: its kernel is then not compiled."""
     hook = sys.unraisablehook
 
     def note(one: sys.UnraisableHookArgs) -> None:
@@ -251,20 +266,20 @@ def _keeping_interrupts(swallowed: list[object]) -> Iterator[None]:
         sys.unraisablehook = hook
 
 
-def _goes_on(words: Sequence[str]) -> bool:
-    """Tell whether a command that was stopped goes on where it was when it is given again."""
-    match list(words[:2]):
-        case ["measure", "run" | "merge" | "find" | "fit" | "track" | "compress"]:
-            return True
-        case ["predict", *_]:
-            flags = {word.split("=")[0] for word in words}
-            # what was drawn is kept beside the page until all is drawn; veiling glare comes after that
-            return "--cache" in flags or (bool({"-o", "--output"} & flags) and "--glare" not in flags)
-    return False
+def _resuming(words: Sequence[str]) -> str:
+    """Return the end of the sentence on an interruption: how the command resumes."""
+    from ..workflow.long_jobs import SAME, job_of
+
+    job = job_of(words)
+    if job is None or job.resume != SAME:
+        return ""
+    if job.kept(words):
+        return ", and the same command resumes"
+    return f"; with {job.needs[0]} or {job.needs[-1]} the same command would resume"
 
 
-def _smaller(words: Sequence[str]) -> str:
-    """Say what takes less memory."""
+def _memory_advice(words: Sequence[str]) -> str:
+    """Return advice on how to use less memory."""
     match list(words[:2]):
         case ["measure", "replay"]:
             return "choose a smaller --size, or leave --ghosts out"
@@ -282,8 +297,8 @@ def _usage(error: Any) -> str:
     message = message[:1].lower() + message[1:]
     cause = error.__cause__
     if hasattr(cause, "errors"):
-        # newer releases of Typer check values as records of files are checked
-        from ..io.sentences import validation_sentences
+        # newer releases of Typer validate values with pydantic
+        from ..io.files.sentences import validation_sentences
 
         message = f"{message.partition(': ')[0]}: {validation_sentences(cause)[0]}"
     for theirs, ours in _TYPES.items():
@@ -295,8 +310,8 @@ def _usage(error: Any) -> str:
 def _fail(message: str, problems: Sequence[str] = ()) -> int:
     print(f"flarewright: error: {' '.join(message.split())}", file=sys.stderr)
     if len(problems) > 1:
-        for problem in problems[:_TOLD]:
+        for problem in problems[:_REPORTED]:
             print(f"  - {problem}", file=sys.stderr)
-        if len(problems) > _TOLD:
-            print(f"  - and {len(problems) - _TOLD} more", file=sys.stderr)
+        if len(problems) > _REPORTED:
+            print(f"  - and {len(problems) - _REPORTED} more", file=sys.stderr)
     return 2

@@ -1,4 +1,4 @@
-"""What several commands share: reading their short texts, telling things, printing JSON."""
+"""Helpers of several commands: option values, output checks, remarks, JSON, progress bars."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import json
 import math
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FlarewrightError, OutputError, ProjectError
@@ -16,9 +19,10 @@ from ..errors import FlarewrightError, OutputError, ProjectError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..optics.repair import Apertures
+    from ..optics.lens_import.patent_repair import Apertures
+    from ..typing import Progress
 
-APERTURES_HELP = "Read the last column of .lens tables as diameters or semi-diameters; left out: as the f-number says."
+APERTURES_HELP = "Read the last column of .lens tables as diameters or semi-diameters (default: by the f-number)."
 
 
 def pair(text: str, flag: str, example: str, separator: str = ",") -> tuple[float, float]:
@@ -28,7 +32,7 @@ def pair(text: str, flag: str, example: str, separator: str = ",") -> tuple[floa
     ----------
     text : str
     flag, example : str
-        For the message.
+        For the error message.
     separator : str
 
     Returns
@@ -72,14 +76,14 @@ def picture_size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def tell(remarks: Iterable[str]) -> None:
+def print_remarks(remarks: Iterable[str]) -> None:
     """Print remarks to stderr, one a line."""
     for remark in remarks:
         print(f"flarewright: {remark}", file=sys.stderr)
 
 
 def aperture_reading(text: str | None) -> Apertures:
-    """Return how `--apertures` has the last column of a `.lens` table read."""
+    """Return the reading of the last column of a `.lens` table that `--apertures` chooses."""
     match text:
         case None:
             return "auto"
@@ -93,19 +97,19 @@ def print_json(data: dict[str, Any]) -> None:
     print(json.dumps(_finite(data), indent=2, allow_nan=False))
 
 
-def refusal(file: str | Path, error: FlarewrightError) -> dict[str, Any]:
-    """Return what `--json` prints of a file that cannot be used."""
+def error_data(file: str | Path, error: FlarewrightError) -> dict[str, Any]:
+    """Return the JSON of `--json` for a file that cannot be used."""
     return {"file": str(file), "usable": False, "reason": str(error), "problems": list(error.problems) or [str(error)]}
 
 
 @contextmanager
-def refused_as_json(file: Path, wanted: bool) -> Iterator[None]:
-    """Print as one JSON object too why a file is refused, where that is wanted; the error goes on."""
+def errors_as_json(file: Path, wanted: bool) -> Iterator[None]:
+    """Print the error of a rejected file as one JSON object if wanted, and raise it again."""
     try:
         yield
     except FlarewrightError as error:
         if wanted:
-            print_json(refusal(file, error))
+            print_json(error_data(file, error))
         raise
 
 
@@ -120,24 +124,28 @@ def _finite(value: Any) -> Any:
 
 
 def check_place(path: Path, suffix: str | tuple[str, ...]) -> None:
-    """Refuse an output that could not be written before the work is done, not after.
+    """Raise an error before the work if an output cannot be written.
 
     Parameters
     ----------
     path : path
     suffix : str or tuple of str
-        How the name may end.
+        Allowed suffixes of the name.
 
     Raises
     ------
     OutputError
-        When the name is empty or ends otherwise than in `suffix`, its folder does not exist, or it is a folder itself.
+        When the name is empty or has another suffix, its folder does not exist, or it is a folder itself.
     """
     allowed = (suffix,) if isinstance(suffix, str) else suffix
     if path == Path():
-        raise OutputError(f"the name of the output is empty or '.', which is a folder; write flare{allowed[0]}, say")
+        raise OutputError(
+            f"the name of the output is empty or '.', which is a folder; write for example flare{allowed[0]}"
+        )
     if path.is_dir():
-        raise OutputError(f"cannot write {path}: it is a folder; give a file name, {path / 'flare'}{allowed[0]} say")
+        raise OutputError(
+            f"cannot write {path}: it is a folder; give a file name, for example {path / 'flare'}{allowed[0]}"
+        )
     if path.suffix == "" and path.name.lower() in allowed:
         raise OutputError(
             f"the output {str(path)!r} is an ending without a name; write {path.with_name('flare' + path.name)}"
@@ -145,13 +153,13 @@ def check_place(path: Path, suffix: str | tuple[str, ...]) -> None:
     if path.suffix.lower() not in allowed:
         raise OutputError(f"the output {str(path)!r} must be named *{' or *'.join(allowed)}")
     if path.parent.exists() and not path.parent.is_dir():
-        raise OutputError(f"cannot write {path}: {path.parent} is a file and no folder; choose another place")
+        raise OutputError(f"cannot write {path}: {path.parent} is a file, not a folder; choose another place")
     if not path.parent.is_dir():
         raise OutputError(f"cannot write {path}: the folder {path.parent} does not exist; create it first")
 
 
 def check_free(path: Path, force: bool) -> None:
-    """Refuse to replace a file that a person may have written, unless asked to.
+    """Raise an error if an output would replace a file without --force.
 
     Parameters
     ----------
@@ -162,14 +170,14 @@ def check_free(path: Path, force: bool) -> None:
     Raises
     ------
     OutputError
-        When there is something of this name already.
+        When the file exists already.
     """
     if path.exists() and not force:
         raise OutputError(f"{path} exists already; choose another name, or replace it with --force")
 
 
 def console() -> Console:
-    """Return where tables go: the terminal's width, or 140 columns in a file or pipe."""
+    """Return the console for tables: as wide as the terminal, or 140 columns in a file or pipe."""
     from rich.console import Console
 
     return Console(markup=False, highlight=False, width=None if sys.stdout.isatty() else 140)
@@ -181,9 +189,9 @@ def chosen_fstop(f_number: float | None) -> float | None:
     Raises
     ------
     FlarewrightError
-        When it is no possible f-number.
+        When it is outside the range of f-numbers.
     """
-    from ..model.lens import LARGEST_F_NUMBER, LEAST_F_NUMBER
+    from ..model.lens.prescription import LARGEST_F_NUMBER, LEAST_F_NUMBER
 
     if f_number is not None and not LEAST_F_NUMBER < f_number <= LARGEST_F_NUMBER:
         raise FlarewrightError(
@@ -194,8 +202,8 @@ def chosen_fstop(f_number: float | None) -> float | None:
 
 
 def write_text(output: Path, text: str) -> None:
-    """Write a text file in UTF-8, whole or not at all."""
-    from ..io.atomic import write_atomically
+    """Write a text file in UTF-8, atomically."""
+    from ..io.files.atomic_write import write_atomically
 
     def write(temporary: Path) -> None:
         temporary.write_text(text, "utf-8")
@@ -205,13 +213,15 @@ def write_text(output: Path, text: str) -> None:
 
 @contextmanager
 def remembered(cache: Path | None, output: Path | None = None) -> Iterator[dict[str, Any]]:
-    """Read pictures drawn before from a file, and keep them and new ones there, after an interruption too.
+    """Load pictures of earlier runs from a file, and store them with new ones every 10 s and at the end of the block.
+
+    A cache that is damaged or cannot be written does not end the run.
 
     Parameters
     ----------
     cache : path or None
-        Where they stay. None: an interrupted run leaves them beside its output (NAME.partial.npz), where the next run
-        finds them; it takes them away when it has ended.
+        File of the pictures. None: they are stored beside the output (NAME.partial.npz) for a run that resumes after
+        an interruption; the end of the block deletes that file.
     output : path or None
     """
     partial = None if output is None else output.with_suffix(".partial.npz")
@@ -219,43 +229,95 @@ def remembered(cache: Path | None, output: Path | None = None) -> Iterator[dict[
     if kept is None:
         yield {}
         return
-    from ..io.flare_cache import read_cache, write_cache
+    from ..io.render_state.flare_cache import read_cache, write_cache
 
-    memory = read_cache(kept) if kept.exists() else {}
-    before = sum(map(len, memory.values()))
-    if cache is None and before:
-        tell([f"{kept}: goes on with {before} pictures that an interrupted run had drawn"])
-    done = False
+    memory = read_cache(kept, lambda line: print_remarks([line])) if kept.exists() else {}
+    stored = sum(map(len, memory.values()))
+    if cache is None and stored:
+        print_remarks([f"{kept}: resuming with {stored} pictures of an interrupted run"])
+
+    def store() -> None:
+        nonlocal stored
+        # the work adds pictures meanwhile
+        drawn = {fingerprint: dict(pictures) for fingerprint, pictures in list(memory.items())}
+        if (number := sum(map(len, drawn.values()))) > stored:
+            write_cache(kept, drawn)
+            stored = number
+
+    failed = False
     try:
-        yield memory
-        done = True
+        with checkpoints(store):
+            yield memory
+    except BaseException:
+        failed = True
+        raise
     finally:
-        if cache is None and done:
+        if cache is None and not failed:
             kept.unlink(missing_ok=True)
-        elif sum(map(len, memory.values())) > before:
-            write_cache(kept, memory)
+        else:
+            try:
+                store()
+            except OutputError as error:
+                print_remarks([f"the pictures are not kept for a later run: {error}"])
+
+
+CHECKPOINT_S = 10.0
+"""Time between two checkpoints of a long job, unless writing takes more than a tenth of it."""
 
 
 @contextmanager
-def progress_bar() -> Iterator[Callable[[str], Callable[[float, str], None]]]:
-    """Show work as bars with an estimate of the time left, where someone looks at it.
+def checkpoints(store: Callable[[], None]) -> Iterator[None]:
+    """Store the state of a job every `CHECKPOINT_S` during the block, on a thread; a full disk does not end the job.
+
+    Parameters
+    ----------
+    store : callable
+        Writes the state; raises OutputError if that fails.
+    """
+    over = Event()
+
+    def work() -> None:
+        pause, reported = CHECKPOINT_S, False
+        while not over.wait(pause):
+            started = time.perf_counter()
+            try:
+                store()
+            except OutputError as error:
+                if not reported:
+                    print_remarks([f"no checkpoint: {error}"])
+                reported = True
+            pause = max(CHECKPOINT_S, 10.0 * (time.perf_counter() - started))
+
+    thread = Thread(target=work, name="checkpoints", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+@contextmanager
+def progress_bar() -> Iterator[Callable[[str], Progress]]:
+    """Show progress as bars with an estimate of the remaining time, on a terminal.
 
     Yields
     ------
     callable
-        Begins the bar of a named part of the work, and returns what is called with the finished part (0 to 1) and what
-        was finished.
+        Starts the bar of a named part of the work, and returns a function to call with the finished fraction (0 to 1)
+        and a description.
     """
     if not sys.stderr.isatty():
         yield lambda _name: lambda _part, _words: None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bars
 
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
 
-        def begin(name: str) -> Callable[[float, str], None]:
+        def begin(name: str) -> Progress:
             task = bars.add_task(name, total=1.0)
             return lambda part, words: bars.update(task, completed=part, description=f"{name}: {words}")
 
@@ -263,30 +325,47 @@ def progress_bar() -> Iterator[Callable[[str], Callable[[float, str], None]]]:
 
 
 @contextmanager
-def first_run_bar() -> Iterator[Callable[[float, str], None] | None]:
-    """Show a first run's compiling as a `progress_bar`; yields None off a terminal."""
+def one_bar(name: str) -> Iterator[Progress | None]:
+    """Show one `progress_bar` with a name; yield None if not on a terminal."""
     if not sys.stderr.isatty():
         yield None
         return
     with progress_bar() as begin:
-        yield begin("first run")
+        yield begin(name)
+
+
+first_run_bar = partial(one_bar, "first run")
+"""Bar of the compilation of a first run."""
+
+
+def ending_signals() -> list[signal.Signals]:
+    """Return the signals that end a command as Ctrl-C does, without those that the caller ignores (`nohup`)."""
+    known = (getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP"))
+    return [one for one in known if one is not None and signal.getsignal(one) is not signal.SIG_IGN]
+
+
+def end_as_interrupted() -> None:
+    """Make a closed terminal and a polite kill end this process as Ctrl-C does: partial work is kept."""
+    for one in ending_signals():
+        signal.signal(one, signal.default_int_handler)
 
 
 @contextmanager
-def interruptible() -> Iterator[Callable[[], bool]]:
-    """Turn Ctrl-C into a wish to end, which the search hears after its round."""
+def stop_on_interrupt() -> Iterator[Callable[[], bool]]:
+    """Convert Ctrl-C, SIGTERM and SIGHUP to a flag that a search checks after each round."""
     asked: list[bool] = []
 
     def note(*_: Any) -> None:
         asked.append(True)
 
     try:
-        before = signal.signal(signal.SIGINT, note)
+        before = {one: signal.signal(one, note) for one in ending_signals()}
     except ValueError:
-        # not the main thread: nobody presses Ctrl-C here
+        # not the main thread, which receives no signals
         yield lambda: False
         return
     try:
         yield lambda: bool(asked)
     finally:
-        signal.signal(signal.SIGINT, before)
+        for one, handler in before.items():
+            signal.signal(one, handler)

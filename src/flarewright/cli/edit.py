@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
+import os
 import socket
+import sys
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Annotated
-from urllib.parse import quote
 
 import typer
 
 from ..errors import ProjectError
-from .common import tell
+from .common import print_remarks
 
 EPILOG = (
     "Examples:\n\nflarewright edit\n\nflarewright edit canon-28-80\n\nflarewright edit shot.toml --port 8100 "
     "--no-browser\n\nIt needs the extra ui: pip install 'flarewright\\[ui]'"
 )
 
-# of the extra ui
+# exit code after a signal
+INTERRUPTED = 130
+# packages of the extra ui
 NEEDED = ("starlette", "uvicorn", "websockets")
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
-# addresses that mean all of this machine's: the one of them to open here, and one that lies beyond any network, to ask
-# the system by which of its own it would go there (nothing is sent)
+# addresses that listen on all interfaces: the address to open here, and one outside any network, whose route names the
+# address of the interface (nothing is sent)
 EVERYWHERE = {"0.0.0.0": ("127.0.0.1", "192.0.2.1"), "::": ("::1", "2001:db8::1")}
 
 
@@ -30,47 +33,73 @@ def edit(
         str | None,
         typer.Argument(metavar="[PROJECT|LENS]", help="A project file, a lens file, or a shipped lens' name."),
     ] = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="0 is any that is free.")] = 8640,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 is any free one (default: 8640).")] = 8640,
     host: Annotated[
-        str, typer.Option(help="Address to listen on; any but this machine's own needs --token.")
+        str, typer.Option(help="Address to listen on; another than the loopback address admits other computers.")
     ] = "127.0.0.1",
-    token: Annotated[str | None, typer.Option(metavar="SECRET", help="Whoever opens the editor must know it.")] = None,
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="File with the secret that opens the editor (default: FLAREWRIGHT_TOKEN, or random)."
+        ),
+    ] = None,
+    base_url: Annotated[
+        str | None, typer.Option(metavar="URL", help="Address or path of the page behind a proxy (default: /).")
+    ] = None,
+    root: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Folder whose files the page may open and save; repeatable (default: the present folder, and that of "
+            "PROJECT).",
+        ),
+    ] = None,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
 ) -> None:
-    """Edit a flare in the browser: drag the light, pull a ghost.
+    """Edit a flare in the browser: drag the light, drag a ghost.
 
-    Goes on where the last session ended, also after a crash. Everything stays on this machine.
+    Resumes the last session, also after a crash. All data stay on this computer.
     """
-    if host not in LOOPBACK and token is None:
-        raise ProjectError(f"--host {host} lets other machines in; give them a --token SECRET too, or leave --host out")
-    if token is not None and len(token) < 8:
-        raise ProjectError("--token is too short to keep anyone out; give at least 8 characters")
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
         raise ProjectError(f"the editor needs the extra ui ({', '.join(missing)}): pip install 'flarewright[ui]'")
-    from ..editor.desk import Desk
-    from ..editor.server import serve
-    from ..editor.session import begin
+    from ..editor.server.access import LOOPBACK, access_of
+    from ..editor.server.app import serve
+    from ..editor.server.tokens import token_of
+    from ..editor.server.workspace import Workspace
+    from ..editor.session.reach import reach_of
+    from ..editor.session.session import begin
+    from ..io.files.state_folder import state_folder
 
+    access = access_of(token_of(token_file), host, base_url)
     session, greeting = begin(what)
+    given = [] if what is None or not Path(what).exists() else [Path(what).resolve().parent]
+    session.reach = reach_of([*(root or [Path.cwd()]), *given, state_folder() / "imports"], session.history)
 
     def ready(found: int) -> None:
         here, *elsewhere = hosts(host)
-        address = _address(here, found, token)
-        tell([f"the editor is at {address}  (Ctrl-C ends it)"])
-        tell(f"from other machines it is at {_address(name, found, token)}" for name in elsewhere)
+        address = access.address(here, found)
+        print_remarks([f"the editor is at {address}  (Ctrl-C ends it)"])
+        print_remarks(f"from other computers it is at {access.address(name, found)}" for name in elsewhere)
+        if host not in LOOPBACK and not access.origin.startswith("https:"):
+            print_remarks(["other computers reach the editor unencrypted: use a network that you trust"])
+        # the address is the first line, for programs that start the editor
+        print_remarks([greeting] if greeting else [])
         if not no_browser:
             import threading
             import webbrowser
 
-            # the page is asked for once the server answers
+            # open the page once the server answers
             threading.Timer(0.3, webbrowser.open, [address]).start()
 
-    serve(Desk(session, greeting), host, port, token, ready)
+    if serve(Workspace(session, greeting), access, port, ready):
+        # a picture or a search in progress keeps its threads for minutes; the autosave is written
+        print("flarewright: the editor has ended; its session is saved", file=sys.stderr, flush=True)
+        os._exit(INTERRUPTED)
 
 
 def hosts(host: str) -> tuple[str, ...]:
-    """Return by which addresses a server that listens on `host` can be opened: from this machine first.
+    """Return the addresses of a server that listens on `host`: for this computer first, then for others.
 
     Parameters
     ----------
@@ -79,7 +108,7 @@ def hosts(host: str) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        One where it is the same for all.
+        A single one if it is the same for all.
     """
     if host not in EVERYWHERE:
         return (host,)
@@ -88,7 +117,7 @@ def hosts(host: str) -> tuple[str, ...]:
 
 
 def _own_address(beyond: str) -> str | None:
-    """Return this machine's address towards another one; None without a network."""
+    """Return this computer's address towards another one; None without a network."""
     family = socket.AF_INET6 if ":" in beyond else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
@@ -96,8 +125,3 @@ def _own_address(beyond: str) -> str | None:
             return str(probe.getsockname()[0])
     except OSError:
         return None
-
-
-def _address(host: str, port: int, token: str | None) -> str:
-    shown = f"[{host}]" if ":" in host else host
-    return f"http://{shown}:{port}/" + (f"?token={quote(token, safe='')}" if token else "")

@@ -1,4 +1,4 @@
-"""`flarewright gallery`: a contact sheet of all lenses and looks."""
+"""`flarewright gallery`: a page and a contact sheet of all lenses and looks."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import OutputError
-from .common import picture_size, print_json, progress_bar, tell, write_text
+from ..errors import FlarewrightError, OutputError
+from .common import picture_size, print_json, print_remarks, progress_bar, write_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..io.contact_sheet import Figure
+    from ..io.images.contact_sheet import Figure
     from ..render.gallery import Card
 
 EPILOG = "Example: flarewright gallery -o gallery --size 640x360"
@@ -28,17 +28,17 @@ _DONE = "gallery.json"
 
 
 def gallery(
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DIR", help="The folder; made where it is missing.")
-    ],
-    size: Annotated[str, typer.Option(metavar="WxH", help="Each picture, in pixels.")] = "480x270",
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="The folder; created if missing.")],
+    size: Annotated[
+        str, typer.Option(metavar="WxH", help="Size of each picture, in pixels (default: 480x270).")
+    ] = "480x270",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Render every lens and every look of the library, and write a page (index.html) and one picture of them all.
+    """Render every lens and every look of the library, and write a page (index.html) and a contact sheet.
 
-    Pictures that are there from an earlier run stay: an interrupted gallery goes on where it was.
+    Pictures of an earlier run are kept: an interrupted gallery resumes.
     """
-    from ..io.contact_sheet import write_contact_sheet
+    from ..io.images.contact_sheet import write_contact_sheet
     from ..render.gallery import cards
 
     size_px = picture_size(size)
@@ -52,9 +52,12 @@ def gallery(
             bar(k / len(known), card.title)
             stamp = _stamp(card, size_px)
             file = f"{card.kind}-{card.name}.png"
-            if done.get(file) != stamp or not (output / file).is_file():
+            whole = _digest(output / file)
+            if done.get(file) != {"of": stamp, "sha256": whole}:
+                if whole is not None and isinstance(kept := done.get(file), dict) and kept.get("of") == stamp:
+                    print_remarks([f"{output / file} is damaged or was changed; it is rendered again"])
                 _render(card, size_px, output / file)
-                done[file] = stamp
+                done[file] = {"of": stamp, "sha256": _digest(output / file)}
                 write_text(output / _DONE, json.dumps(done, indent=1))
             figures.append(_figure(card, file, output / file))
     page, picture = write_contact_sheet(output, TITLE, figures)
@@ -62,16 +65,16 @@ def gallery(
         pictures = [{"kind": card.kind, "name": card.name, "command": card.command} for card in known]
         print_json({"page": str(page), "picture": str(picture), "pictures": pictures})
     else:
-        tell([f"wrote {page}", f"wrote {picture}"])
+        print_remarks([f"wrote {page}", f"wrote {picture}"])
 
 
 def shipped_gallery(folder: Path) -> Path:
-    """Write the contact sheet of the pictures that ship, in no time.
+    """Write the page of the shipped pictures, without rendering.
 
     Parameters
     ----------
     folder : Path
-        Made where it is missing.
+        Created if missing.
 
     Returns
     -------
@@ -83,9 +86,9 @@ def shipped_gallery(folder: Path) -> Path:
     OutputError
         When it cannot be written.
     """
-    from ..io.atomic import write_atomically
-    from ..io.contact_sheet import write_contact_sheet
-    from ..io.thumbnails import thumbnail_path
+    from ..io.files.atomic_write import write_atomically
+    from ..io.images.contact_sheet import write_contact_sheet
+    from ..io.images.thumbnails import thumbnail_path
     from ..render.gallery import cards
 
     _make(folder)
@@ -99,11 +102,11 @@ def shipped_gallery(folder: Path) -> Path:
 
 def _render(card: Card, size_px: tuple[int, int], path: Path) -> None:
     from .. import __version__
-    from ..io.png import write_png
-    from ..render.first_run import compile_for_render
+    from ..io.images.png import write_png
     from ..render.gallery import card_picture, card_project
+    from ..render.warmup import compile_for_render
 
-    compile_for_render(card_project(card, size_px), None, lambda sentence: tell([sentence]))
+    compile_for_render(card_project(card, size_px), None, lambda sentence: print_remarks([sentence]))
     about = {"Software": f"Flarewright {__version__}", "Description": card.command}
     write_png(path, card_picture(card, size_px), about)
 
@@ -112,28 +115,40 @@ def _figure(card: Card, file: str, path: Path) -> Figure:
     import numpy as np
     from PIL import Image
 
-    from ..io.contact_sheet import Figure
+    from ..io.files.door import outside
+    from ..io.images.contact_sheet import Figure
 
-    with Image.open(path) as image:
+    with outside(path, "a picture", pixel_bytes=4) as file_of_picture, Image.open(file_of_picture) as image:
         pixels = np.asarray(image.convert("RGB"))
     return Figure(SECTIONS[card.kind], card.title, card.caption, card.command, file, pixels)
 
 
 def _stamp(card: Card, size_px: Sequence[int]) -> str:
-    """Return what a picture depends on, in short: the version and what it shows."""
+    """Return a hash of the version, project and lens of a picture."""
     from .. import __version__
-    from ..io.library import lens_path
+    from ..io.files.text_file import read_bytes
+    from ..io.lens.library import lens_path
     from ..render.gallery import card_project
 
     project = card_project(card, (size_px[0], size_px[1]))
-    lens = lens_path(str(project.lens)).read_bytes()
+    lens = read_bytes(lens_path(str(project.lens)), "a lens file")
     return sha256(f"{__version__} {project.model_dump_json()}".encode() + lens).hexdigest()[:16]
 
 
-def _read_done(path: Path) -> dict[str, Any]:
+def _digest(path: Path) -> str | None:
+    """Return a hash of a file's bytes; None if there is none to read."""
     try:
-        found = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError):
+        return sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return None
+
+
+def _read_done(path: Path) -> dict[str, Any]:
+    from ..io.files.text_file import read_json
+
+    try:
+        found = read_json(path, "a list of pictures")
+    except FlarewrightError:
         return {}
     return found if isinstance(found, dict) else {}
 

@@ -1,4 +1,4 @@
-"""`flarewright looks`: the looks that ship, and a look taken from any project."""
+"""`flarewright looks`: the shipped looks, and a look from any project."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .common import check_free, check_place, console, print_json, tell, write_text
+from .common import check_free, check_place, console, print_json, print_remarks, write_text
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -29,11 +29,11 @@ def looks(
     context: typer.Context,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """List the looks that ship, with a picture of each where the terminal has the colours."""
+    """List the shipped looks, with pictures on a terminal with enough colours."""
     if context.invoked_subcommand is not None:
         return
-    from ..io.look_file import read_look, shipped_looks
-    from ..io.thumbnails import thumbnail_path
+    from ..io.images.thumbnails import thumbnail_path
+    from ..io.project.look_file import read_look, shipped_looks
     from ..render.gallery import cards
 
     known = {name: read_look(name) for name in shipped_looks()}
@@ -57,7 +57,7 @@ def looks(
         out.add_column("")
     out.add_column("name", no_wrap=True)
     out.add_column("shown with", no_wrap=True)
-    out.add_column("what it is")
+    out.add_column("description")
     for card in (card for card in cards() if card.kind == "look"):
         picture = [_picture(card)] if pictured else []
         out.add_row(*picture, card.name, str(known[card.name].example.lens), card.caption)
@@ -67,30 +67,30 @@ def looks(
 def save(
     project: Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file.")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="LOOK.toml", help="The look.")],
-    name: Annotated[str | None, typer.Option(help="Its name; that of the file when left out.")] = None,
-    notes: Annotated[str, typer.Option(help="A sentence on what it is made of.")] = "",
-    force: Annotated[bool, typer.Option("--force", help="Replace a file of this name.")] = False,
+    name: Annotated[str | None, typer.Option(help="Name of the look (default: that of the file).")] = None,
+    notes: Annotated[str, typer.Option(help="A sentence on its contents.")] = "",
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> None:
-    """Take the look of a project: coatings, iris, f-number, dirt, scatter, colours, changes by hand."""
-    from ..io.look_file import look_text
-    from ..io.project_file import read_project
-    from ..render.looks import look_of
+    """Save the look of a project: coatings, iris, f-number, dirt, scatter, colours, overrides."""
+    from ..io.project.look_file import look_text
+    from ..io.project.project_file import read_project
+    from ..render.scene.looks import look_of
 
     check_place(output, ".toml")
     check_free(output, force)
     title = name if name is not None else output.stem.replace("-", " ").replace("_", " ").capitalize()
     look, remarks = look_of(read_project(project), title, notes)
     write_text(output, look_text(look, output.parent))
-    tell([*remarks, f"the look has {', '.join(look.says)}", f"wrote {output}"])
+    print_remarks([*remarks, f"the look has {', '.join(look.says)}", f"wrote {output}"])
 
 
 def _picture(card: Card) -> Text:
-    """Draw a small picture in half blocks: the upper pixel in the letter's colour, the lower one behind it."""
+    """Draw a small picture in half blocks: the upper pixel as foreground colour, the lower one as background."""
     import numpy as np
     from PIL import Image
     from rich.text import Text
 
-    from ..io.thumbnails import thumbnail
+    from ..io.images.thumbnails import thumbnail
 
     with Image.open(BytesIO(thumbnail(card.kind, card.name))) as image:
         rows = 2 * round(0.5 * _COLUMNS * image.height / image.width)

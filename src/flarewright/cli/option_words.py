@@ -1,4 +1,4 @@
-"""What help says of an option's value: NUMBER, where the library of commands would say <float>."""
+"""Placeholders of option values in help texts: NUMBER instead of the library's <float>."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _WORDS = {bool: "", int: "N", float: "NUMBER", Path: "FILE", str: "TEXT"}
 
 
 def name_values(app: typer.Typer) -> None:
-    """Give every option that names its value not itself a word for it.
+    """Set a placeholder for every option without one.
 
     Parameters
     ----------
     app : Typer
-        Its commands' options are changed, and those of the groups below it.
+        Modified: options of its commands and of the groups below it.
     """
     for command in (*app.registered_commands, app.registered_callback):
         if command is None or command.callback is None:
@@ -28,17 +28,17 @@ def name_values(app: typer.Typer) -> None:
         for hint in hints.values():
             for option in getattr(hint, "__metadata__", ()):
                 if isinstance(option, OptionInfo) and option.metavar is None:
-                    option.metavar = next((_WORDS[kind] for kind in _kinds(hint) if kind in _WORDS), None)
-        # evaluated here once, or the words would be lost
+                    option.metavar = next((_WORDS[kind] for kind in kinds_of(hint) if kind in _WORDS), None)
+        # evaluate the annotation once and store it, or the change would be lost
         command.callback.__annotations__ = hints
     for group in app.registered_groups:
         if group.typer_instance is not None:
             name_values(group.typer_instance)
 
 
-def _kinds(hint: Any) -> Iterator[Any]:
-    """Yield the types within an annotation, those of its lists and choices too."""
+def kinds_of(hint: Any) -> Iterator[Any]:
+    """Yield the types within an annotation, including those of lists and unions."""
     yield hint
     parts = get_args(hint)
     for part in parts[:1] if get_origin(hint) is Annotated else parts:
-        yield from _kinds(part)
+        yield from kinds_of(part)

@@ -1,23 +1,45 @@
-"""Frozen data without algorithms: lens, glass, coating, iris, light, camera, project."""
+"""Frozen records of lenses, projects and measurements, validated with pydantic; no algorithms.
 
-from .art import Art, Rule
-from .camera import Camera
-from .coating import Bare, Coating, Film, QuarterWave, Stack, Standard
-from .design import Bounds, Design, GhostWish
-from .figure import Figure
-from .glass import Dispersion, Medium
-from .grating import SensorGrating
-from .holdout import Holdout
-from .imperfection import Imperfection
-from .iris import Iris
+The records re-exported here are the public ones. Files are read and written in `flarewright.io`.
+
+- `base`: `Frozen`, the base class of all records
+- `bytes_text`: arrays of bytes as base64 text
+- `layer`: `Layer`, a named linear image
+- `lens`: prescriptions, coatings, glasses, iris, plates
+- `project`: projects, cameras, lights, art direction, design targets, scenes
+- `measurement`: captures, merged frames, ghost models, tracks
+"""
+
 from .layer import Layer
-from .lens import Element, Lens, Position, Row, Stop, Surface
-from .light import D65, BlackBody, EqualEnergy, Light, LightKey, Lines, Polygon, Rectangle, Rgb, Spectrum, Tabulated
-from .look import Look
-from .plate import Plate
-from .project import AsLens, CoatingChoice, Everywhere, InTurn, Output, PerRow, Preset, Project, Quality
-from .scatter import RowScatter, Scatter
-from .starburst import Dirt, Starburst
+from .lens.coating import Bare, Coating, Film, QuarterWave, Stack, Standard
+from .lens.figure import Figure
+from .lens.glass import Dispersion, Medium
+from .lens.grating import SensorGrating
+from .lens.imperfection import Imperfection
+from .lens.iris import Iris
+from .lens.plate import Plate
+from .lens.prescription import Element, Lens, Position, Row, Stop, Surface
+from .lens.scatter import RowScatter, Scatter
+from .project.art import Art, Rule
+from .project.camera import Camera
+from .project.design import Bounds, Design, GhostTarget
+from .project.holdout import Holdout
+from .project.light import (
+    D65,
+    BlackBody,
+    EqualEnergy,
+    Light,
+    LightKey,
+    Lines,
+    Polygon,
+    Rectangle,
+    Rgb,
+    Spectrum,
+    Tabulated,
+)
+from .project.look import Look
+from .project.project import AsLens, CoatingChoice, Everywhere, InTurn, Output, PerRow, Preset, Project, Quality
+from .project.starburst import Dirt, Starburst
 
 __all__ = [
     "D65",
@@ -37,7 +59,7 @@ __all__ = [
     "Everywhere",
     "Figure",
     "Film",
-    "GhostWish",
+    "GhostTarget",
     "Holdout",
     "Imperfection",
     "InTurn",

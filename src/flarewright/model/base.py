@@ -1,4 +1,4 @@
-"""The common habit of all data: frozen, strict about names, finite numbers only."""
+"""`Frozen`, the base class of all records: immutable, strict about names, finite numbers only."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 
-# pydantic gives what is frozen a hash of its fields
+# pydantic gives frozen models a hash of their fields
 class Frozen(BaseModel):  # noqa: PLW1641
-    """Base of every record: immutable, unknown keys refused, NaN and infinity refused."""
+    """Base class of every record: immutable; rejects unknown keys, NaN and infinity."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     def __eq__(self, other: object) -> bool:
-        """Tell whether another record is of the same type and has equal fields.
+        """Return whether another record has the same type and equal fields.
 
-        What a record keeps beside its fields, such as an array that was read from one of them, does not count: pydantic
-        compares it first, and of arrays it cannot be told whether they are equal.
+        Values cached next to the fields, such as decoded arrays, are ignored. pydantic's own comparison includes them
+        and fails on arrays, whose truth value is ambiguous.
         """
         if self is other:
             return True

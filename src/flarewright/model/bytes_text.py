@@ -1,38 +1,38 @@
-"""Bytes as text in a file: base64 of zlib."""
+"""Bytes as text for JSON files: zlib, then base64."""
 
 from __future__ import annotations
 
 import base64
 import zlib
 
-# the last level makes texts 2 % shorter, and takes three to nine times as long
+# level 9 shortens the text by 2 % and takes three to nine times as long
 _LEVEL = 6
-_REMEDY = "the file was changed by hand or made by another flarewright; make it anew (measure run)"
+_REMEDY = "the file was edited or written by another flarewright version; run measure run again"
 
 
-def told_bytes(whole: bytes) -> str:
-    """Return bytes as text."""
+def encode_bytes(whole: bytes) -> str:
+    """Return bytes as base64 text of their zlib stream."""
     return base64.b64encode(zlib.compress(whole, _LEVEL)).decode("ascii")
 
 
-def read_bytes(text: str, size: int, what: str) -> bytes:
-    """Return the bytes that a text tells.
+def decode_bytes(text: str, size: int, what: str) -> bytes:
+    """Return the bytes that `encode_bytes` encoded.
 
     Parameters
     ----------
     text : str
     size : int
-        How many they must be.
+        Expected number of bytes.
     what : str
-        Said when they are not.
+        Plural noun for error messages.
 
     Raises
     ------
     ValueError
-        When the text is broken, or tells more or fewer.
+        When the text is not base64 of zlib, or holds another number of bytes.
     """
     try:
-        # a few bytes can stand for more than any memory holds
+        # limit the output: a few bytes can decompress to more than the memory holds
         whole = zlib.decompressobj().decompress(base64.b64decode(text, validate=True), size + 1)
     except (ValueError, zlib.error):
         raise ValueError(f"{what} are not base64 of zlib: {_REMEDY}") from None

@@ -1,1 +1,75 @@
-"""How much flare there will be: statistics over the constellation, contrast, and cameras and lights in a scene."""
+"""Predict flare: statistics over the constellation, loss of contrast, and cameras and lights in a scene.
+
+- `flare`: `Flare`, the flare of one light as a function of its position, and `Frame`
+- `lens_flare`: `lens_flare` and `square_flare` build a `Flare` from a lens
+- `wavelengths`: few wavelengths that give the right luminance
+- `statistics`: `Statistics` of a picture's flare (`measure`)
+- `table`: `FlareTable` draws each picture of a flare once
+- `curves`: `sample_curves` samples the statistics over the constellation; `check_curves`
+- `contrast`: `contrast` and `washed_share`, the loss of contrast
+- `occurrence`: `predict_occurrence` predicts the flare of one camera; `occurrence_data` as JSON
+- `occurrence_page`: `occurrence_page`, its HTML report
+- `photometry`: illuminance by lamps, and exposure of a sensor
+- `sun`: path and illuminance of the sun
+- `tracks`: positions of a scene's cameras and lights over time (`sightings`)
+- `plan`: `plan_scene` predicts the flare of a scene; `ranking` sorts its pairs of camera and light
+- `switching`: `choose_cameras` chooses the camera with the least flare over time
+- `search`: `best_position` searches a camera position with less flare
+- `worst`: `render_worst` renders the worst moments
+- `scene_data`: `scene_data`, the plan as JSON
+- `scene_page`: `scene_page`, its HTML report
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..lazy import lazy_names
+
+if TYPE_CHECKING:
+    from .curves import Curves as Curves
+    from .curves import sample_curves as sample_curves
+    from .flare import Flare as Flare
+    from .flare import Frame as Frame
+    from .lens_flare import lens_flare as lens_flare
+    from .lens_flare import square_flare as square_flare
+    from .occurrence import Flares as Flares
+    from .occurrence import Occurrence as Occurrence
+    from .occurrence import Setting as Setting
+    from .occurrence import Wanted as Wanted
+    from .occurrence import predict_occurrence as predict_occurrence
+    from .plan import Plan as Plan
+    from .plan import plan_scene as plan_scene
+    from .plan import ranking as ranking
+    from .switching import choose_cameras as choose_cameras
+
+__all__, __getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        ".curves": (
+            "Curves",
+            "sample_curves",
+        ),
+        ".flare": (
+            "Flare",
+            "Frame",
+        ),
+        ".lens_flare": (
+            "lens_flare",
+            "square_flare",
+        ),
+        ".occurrence": (
+            "Flares",
+            "Occurrence",
+            "Setting",
+            "Wanted",
+            "predict_occurrence",
+        ),
+        ".plan": (
+            "Plan",
+            "plan_scene",
+            "ranking",
+        ),
+        ".switching": ("choose_cameras",),
+    },
+)

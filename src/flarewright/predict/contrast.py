@@ -1,16 +1,13 @@
-"""What flare takes from a picture's contrast (Walch 2017, section 9.2)."""
+"""Loss of a picture's contrast by flare (Walch 2017, section 9.2)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-Floats = NDArray[np.float64]
+from ..typing import Floats
 
 WASHED = 0.9
-"""Where less than this part of the contrast is left, flare is taken as seen."""
+"""Part of the contrast; where less remains, flare counts as visible."""
 
 __all__ = ["WASHED", "Contrast", "contrast", "washed_share"]
 
@@ -31,14 +28,14 @@ class Contrast:
 
 
 def contrast(i_max: float, i_min: float, i_flare: float) -> Contrast:
-    """Compute the contrast of a scene under an even veil.
+    """Compute the contrast of a scene under a uniform veil.
 
     Parameters
     ----------
     i_max, i_min : float
-        Brightest and darkest of the scene, above 0 and at least 0.
+        Brightest and darkest value of the scene, above 0 and at least 0.
     i_flare : float
-        What flare adds to both, in their unit.
+        Flare that is added to both, in the same unit.
 
     Returns
     -------
@@ -58,16 +55,16 @@ def contrast(i_max: float, i_min: float, i_flare: float) -> Contrast:
 
 
 def washed_share(flare: Floats, share: Floats, i_max: float, i_min: float) -> float:
-    """Return the part of a frame where flare leaves less than `WASHED` of the contrast.
+    """Return the part of a frame where flare reduces the contrast to less than `WASHED`.
 
     Parameters
     ----------
     flare : ndarray, shape (H, W)
         In the unit of the scene.
     share : ndarray, shape (H, W)
-        How much of each pixel lies in the frame.
+        Part of each pixel inside the frame.
     i_max, i_min : float
-        Of the scene.
+        Brightest and darkest value of the scene.
     """
     # the flare at which equation 9.3 gives WASHED
     limit = 0.5 * (i_max + i_min) * (1.0 / WASHED - 1.0)

@@ -1,26 +1,22 @@
-"""Statistic functions: estimators over the constellation, sampled where they bend (Walch 2017, chapter 9)."""
+"""Statistics over the constellation, sampled adaptively (Walch 2017, chapter 9)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Floats, Indices, Progress
 from .flare import Flare, luminance
 from .statistics import NAMES, Statistics, measure
 from .table import FlareTable
 
-Floats = NDArray[np.float64]
-Progress = Callable[[float, str], None]
-
-# constellations drawn before any refinement, and the least distance between two, degrees
+# number of initial constellations, and least distance between two, degrees
 FIRST, LEAST_DEG = 13, 0.2
-# what is fainter than this part of a curve's maximum need not be followed closely
+# values below this part of a curve's maximum are followed less closely
 FAINT = 1e-3
-# a factor between neighbouring samples that no slope has
+# ratio of adjacent samples that counts as a discontinuity
 CLIFF = 30.0
 
 __all__ = ["Check", "Curves", "bins_of", "check_curves", "sample_curves"]
@@ -38,7 +34,7 @@ class Curves:
         Columns in the order of `statistics.NAMES`.
     roll_deg : float
     worst_step : float
-        Largest error of a line between two samples that is expected where sampling ended, as `tolerance`.
+        Largest expected interpolation error between two samples at the end of sampling; defined as `tolerance`.
     """
 
     constellation_deg: Floats
@@ -51,18 +47,18 @@ class Curves:
         return self.values[:, NAMES.index(name)]
 
     def at(self, constellation_deg: float) -> Statistics:
-        """Return the statistics between the samples, see `between`; beyond them those of the first or last."""
+        """Return `interpolated_statistics`; outside the samples those of the first or last one."""
         angles = self.constellation_deg
         k = int(np.clip(np.searchsorted(angles, constellation_deg) - 1, 0, max(len(angles) - 2, 0)))
         if len(angles) == 1:
             return Statistics(*map(float, self.values[0]))
         part = float(np.clip((constellation_deg - angles[k]) / (angles[k + 1] - angles[k]), 0.0, 1.0))
-        return Statistics(*map(float, between(self.values[k], self.values[k + 1], part)))
+        return Statistics(*map(float, interpolated_statistics(self.values[k], self.values[k + 1], part)))
 
 
 @dataclass(frozen=True)
 class Check:
-    """Curves against renders of their own at constellations between the samples.
+    """Curves compared with separate renders at constellations between the samples.
 
     Attributes
     ----------
@@ -81,8 +77,8 @@ class Check:
             return np.asarray(np.where(self.rendered > 0.0, self.predicted / self.rendered, np.nan))
 
 
-def between(a: Floats, b: Floats, part: float) -> Floats:
-    """Interpolate statistics: straight lines of their logarithms, and of themselves at cliffs.
+def interpolated_statistics(a: Floats, b: Floats, part: float) -> Floats:
+    """Interpolate statistics linearly in their logarithms, and linearly in the values at discontinuities.
 
     Parameters
     ----------
@@ -92,8 +88,8 @@ def between(a: Floats, b: Floats, part: float) -> Floats:
 
     Notes
     -----
-    Towards the edge of the field flare falls by decades, where straight lines of the values lie too high. Where it
-    falls more than `CLIFF` times from one sample to the next, a ghost has left the frame, and nobody knows where.
+    Towards the edge of the field flare falls by decades, where linear interpolation of the values is too high. Where a
+    value falls more than `CLIFF` times between two samples, a ghost has left the frame at an unknown constellation.
     """
     slope = np.maximum(a, b) < CLIFF * np.minimum(a, b)
     logs = np.log(np.where(slope, a, 1.0)) * (1.0 - part) + np.log(np.where(slope, b, 1.0)) * part
@@ -109,7 +105,7 @@ def sample_curves(
     most: int = 64,
     progress: Progress | None = None,
 ) -> Curves:
-    """Draw the flare at constellations chosen so that lines between them (`between`) are good enough.
+    """Sample the flare at constellations at which interpolation (`interpolated_statistics`) reaches a tolerance.
 
     Parameters
     ----------
@@ -118,12 +114,12 @@ def sample_curves(
         The largest constellation; None: the flare's reach.
     roll_deg : float
     tolerance : float
-        Error of a line that is good enough, of sum, mean, maximum and log-average alike, relative to the geometric mean
-        of the value and the curve's maximum: a tenth as much flare may err by three times the share.
+        Largest interpolation error of sum, mean, maximum and log-average, relative to the geometric mean of the value
+        and the curve's maximum: a value of a tenth of the maximum can have three times the relative error.
     most : int
-        Drawn constellations; sampling ends there at the latest, and says so by `worst_step`.
+        Largest number of constellations; `worst_step` shows the error if sampling ends there.
     progress : callable, optional
-        Called with the finished part and what was drawn.
+        Called with the finished part and a description.
 
     Returns
     -------
@@ -131,8 +127,8 @@ def sample_curves(
 
     Notes
     -----
-    The interval whose last halving showed the largest error is halved next. An even sweep of `FIRST` constellations
-    comes first, so that a narrow peak between two of them may be missed; `check_curves` looks at others.
+    The interval with the largest error at its last halving is halved next. The `FIRST` initial constellations are
+    evenly spaced, so a narrow peak between two of them can be missed; `check_curves` renders at others.
     """
     end = table.flare.reach_deg if to_deg is None else to_deg
     known: dict[float, Floats] = {}
@@ -147,7 +143,7 @@ def sample_curves(
     first = [float(angle) for angle in np.linspace(table.flare.least_deg, end, min(FIRST, most))]
     for angle in first:
         draw(angle)
-    # (error found when the interval was made, from, to)
+    # (error found when the interval was created, start, end)
     waiting = [(np.inf, a, b) for a, b in pairwise(first)]
     while len(known) < most:
         waiting.sort(key=lambda one: (-one[0], one[1]))
@@ -158,11 +154,11 @@ def sample_curves(
         middle = 0.5 * (a + b)
         found = draw(middle)
         peak = np.max(list(known.values()), axis=0)
-        line = between(known[a], known[b], 0.5)
+        line = interpolated_statistics(known[a], known[b], 0.5)
         off = np.abs(found - line) / np.maximum(np.sqrt(np.maximum(found, FAINT * peak) * peak), 1e-30)
         error = float(off[_FOLLOWED].max())
         if b - a > 2.0 * LEAST_DEG:
-            # a halved interval of a smooth curve errs a quarter as much; one that crosses its line by chance does not
+            # halving a smooth interval divides its error by four; keep part of the previous error against chance hits
             left = 0.25 * max(error, 0.25 * before if before < np.inf else 0.0)
             waiting += [(left, a, middle), (left, middle, b)]
     angles = np.array(sorted(known))
@@ -170,25 +166,25 @@ def sample_curves(
     return Curves(angles, np.array([known[angle] for angle in angles]), roll_deg, float(worst))
 
 
-# the minimum of a picture is mostly 0 and says little: it is told and not followed
+# the minimum of a picture is mostly 0, so it is recorded but does not control sampling
 _FOLLOWED = [NAMES.index(name) for name in ("sum_mm2", "mean", "maximum", "log_average")]
 
 
 def check_curves(curves: Curves, judge: Flare, count: int, progress: Progress | None = None) -> Check:
-    """Draw the flare at constellations where the curves have no sample and compare.
+    """Compare the curves with renders at constellations between the samples.
 
     Parameters
     ----------
     curves : Curves
     judge : Flare
-        Of better quality, over the frame itself, with pixels of the same size.
+        Flare in better quality, over the frame itself, with pixels of the same size.
     count : int
     progress : callable, optional
 
     Returns
     -------
     Check
-        At the middles of the intervals between samples that lie nearest to an even spread.
+        At the midpoints between samples that are nearest to an even spacing.
     """
     at = curves.constellation_deg
     middles = 0.5 * (at[1:] + at[:-1])
@@ -204,24 +200,24 @@ def check_curves(curves: Curves, judge: Flare, count: int, progress: Progress | 
     return Check(np.array(chosen), np.array(predicted).reshape(-1, len(NAMES)), np.array(rendered).reshape(-1, 5))
 
 
-def bins_of(values: Floats, count: int) -> tuple[Floats, NDArray[np.int64]]:
-    """Divide the range of a curve between its extremes into even bins.
+def bins_of(values: Floats, count: int) -> tuple[Floats, Indices]:
+    """Divide the range between the extremes of a curve into equal bins.
 
     Parameters
     ----------
     values : ndarray, shape (N,)
     count : int
-        Bins.
+        Number of bins.
 
     Returns
     -------
     edges : ndarray, shape (count + 1,)
     bins : ndarray, shape (N,)
-        1 (least flare) to `count` (most); 1 throughout for a curve without range.
+        1 (least flare) to `count` (most); all 1 for a constant curve.
 
     Notes
     -----
-    Walch 2017, section 9.2: how a constellation compares with all others.
+    Walch 2017, section 9.2: a rating of each constellation relative to all others.
     """
     low, high = float(values.min()), float(values.max())
     edges = np.linspace(low, high, count + 1)

@@ -1,6 +1,6 @@
-"""A flare as a function of where the light stands: what every prediction is made from.
+"""The flare of one light as a function of the light's position, the input of every prediction.
 
-The command line builds one from a lens (`lens_flare`) or from a measured model; nothing else here knows which it is.
+A `Flare` is built from a lens (`lens_flare`) or from a measured model; the predictions do not depend on which.
 """
 
 from __future__ import annotations
@@ -9,15 +9,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..model import Layer
-from ..optics.color import luminance_weights
+from ..optics.colour.rgb import luminance_weights
+from ..typing import Floats, Mask, Pixels
 
-Floats = NDArray[np.float64]
-
-# the direct image of the light is no flare, and the beauty holds it; a measured flare's has no layer of its own, so
-# that flare comes without what is around the light
+# layers without flare: the direct image of the light, and the beauty, which includes it; a measured flare has no layer
+# of the direct image and leaves out the surroundings of the light instead
 NO_FLARE = ("beauty", "starburst")
 
 __all__ = ["Flare", "Frame", "luminance"]
@@ -32,53 +30,53 @@ class Frame:
 
     @property
     def diagonal(self) -> float:
-        """Corner to corner, mm."""
+        """Length of the diagonal, mm."""
         return float(np.hypot(self.width, self.height))
 
     @property
     def area(self) -> float:
-        """mm^2."""
+        """Area, mm^2."""
         return self.width * self.height
 
 
 @dataclass(frozen=True)
 class Flare:
-    """What a camera makes of one light.
+    """Flare of one light in a camera.
 
     Attributes
     ----------
     name : str
     draw : callable
-        (constellation_deg, roll_deg) to layers of irradiance on the sensor, relative to the light's irradiance on a
-        plane facing it (docs/physics.md, "Radiometry"); a layer of the direct image may be among them.
+        Maps (constellation_deg, roll_deg) to layers of irradiance on the sensor, relative to the light's irradiance on
+        a plane facing it (docs/physics.md, "Radiometry"); one of them can be the direct image.
     size_px : tuple of int
-        Of the picture that it draws.
+        Size of the drawn picture.
     sensor : Frame
-        What that picture covers.
+        Area that the picture covers.
     f_number : float
     efl : float or None
-        Focal length, mm; None: not known.
+        Focal length, mm; None: unknown.
     scene_scale : float
         Irradiance on the sensor per radiance of an extended scene.
     turns_by_deg : float or None
-        The roll that only turns the picture, and its multiples: 0 any, a blade's angle, or None: no roll does.
+        Roll whose multiples only rotate the picture: 0 for any roll, or the angle of a blade; None: no such roll.
     least_deg, reach_deg : float
-        The smallest and the largest constellation that it knows.
+        Smallest and largest known constellation.
     dark_beyond : bool
-        Whether a light beyond makes no flare; else nobody knows.
+        Whether a light outside that range makes no flare; otherwise its flare is unknown.
     unit : str
-        Of what it draws, in words.
+        Unit of the drawn values, in words.
     per_lux : bool
-        Whether that is over the light's illuminance; else it is of the light that was photographed, whatever that gave.
+        Whether values are relative to the light's illuminance; otherwise they are those of the photographed light.
     fingerprint : str
-        The same for flares that draw the same.
+        Equal for flares that draw the same pictures.
     left_out : str
-        What of the light is not in it, in words.
+        Light that is left out, in words.
     over_clipping : float or None
-        The signal over the one at which the sensor clips, of light 1 of what it draws on a measured camera at its
-        settings; None: not known. A lens' sensor clips by its ISO (`photometry.exposure_level`).
+        Sensor signal over its clipping level for a drawn value of 1, of a measured camera at its settings; None:
+        unknown. The clipping of a lens' sensor follows from its ISO (`photometry.exposure_level`).
     remarks : tuple of str
-        What a person should know.
+        Remarks for the user.
     """
 
     name: str
@@ -99,22 +97,22 @@ class Flare:
     over_clipping: float | None = None
     remarks: tuple[str, ...] = ()
 
-    def covers(self, constellation_deg: Floats) -> NDArray[np.bool_]:
-        """Tell of each constellation whether it can be drawn."""
+    def covers(self, constellation_deg: Floats) -> Mask:
+        """Return for each constellation whether it can be drawn."""
         return np.asarray((constellation_deg >= self.least_deg) & (constellation_deg <= self.reach_deg))
 
     @property
     def aperture(self) -> str:
         """The f-number in words."""
-        return f"f/{self.f_number:.3g}" if np.isfinite(self.f_number) else "f-number not told"
+        return f"f/{self.f_number:.3g}" if np.isfinite(self.f_number) else "f-number unknown"
 
     @property
     def pitch_mm(self) -> float:
-        """Side of a pixel, of the same area as its pixels when those are oblong."""
+        """Side of a pixel, mm; of a square of equal area for oblong pixels."""
         width, height = self.size_px
         return float(np.sqrt(self.sensor.area / (width * height)))
 
-    def picture(self, constellation_deg: float, roll_deg: float = 0.0) -> NDArray[np.float32]:
+    def picture(self, constellation_deg: float, roll_deg: float = 0.0) -> Pixels:
         """Draw the flare without the direct image, shape (H, W, 3), relative irradiance."""
         width, height = self.size_px
         total = np.zeros((height, width, 3), dtype=np.float32)
@@ -125,6 +123,6 @@ class Flare:
         return total
 
 
-def luminance(picture: NDArray[np.float32]) -> Floats:
-    """Return the luminance of linear Rec.709 pixels, shape (H, W); colours outside the triangle give no less than 0."""
+def luminance(picture: Pixels) -> Floats:
+    """Return the luminance of linear Rec.709 pixels, shape (H, W); negative luminance becomes 0."""
     return np.maximum(picture.astype(np.float64) @ luminance_weights("rec709"), 0.0)

@@ -1,4 +1,4 @@
-"""The flare of a lens: rendered at any constellation by the one renderer."""
+"""Build the flare of a lens, rendered at any constellation."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from math import acos, cos, degrees, radians
 
 from ..errors import LensError
 from ..model import Camera, Dirt, Layer, Output, Project, Quality
-from ..optics.constellation import field_angles
-from ..render.opening import make_opening
-from ..render.prepare import Settled, as_lens, settle
+from ..optics.lens.field_angles import field_angles
 from ..render.render import render
-from ..render.shots import make_shots
+from ..render.scene.opening import make_opening
+from ..render.scene.resolve import ResolvedProject, resolve_project
+from ..render.scene.shots import make_shots
 from .flare import Flare, Frame
 from .wavelengths import luminous_lines
 
-# field angles are below 90 degrees, and grazing light carries nothing
+# largest constellation; field angles are below 90 degrees, and grazing light carries no energy
 REACH_DEG = 85.0
-# nearer along the axis than so many focal lengths a light stands between lens and hood
+# least distance of a light along the axis, focal lengths; nearer lights are inside the lens or hood
 LEAST_FRONT = 2.0
-# pixels across what is drawn for statistics; a flare is smooth but for its brightest spots
+# width in pixels of pictures for statistics; a flare is smooth except for its brightest spots
 SIDE_PX = 192
 
 __all__ = ["largest_constellation", "lens_flare", "luminous", "square_flare", "statistics_quality"]
 
 
 def statistics_quality(mode: str) -> Quality:
-    """Return the quality that pictures for statistics are drawn in: coarse in what an average does not see.
+    """Return the quality of renders for statistics, coarse where averages do not change.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def luminous(project: Project, quality: Quality) -> Project:
     ----------
     project : Project
     quality : Quality
-        Its wavelengths are placed for the first light's luminance.
+        Its wavelengths are chosen for the luminance of the first light.
     """
     light = project.lights[0]
     lines = luminous_lines(light.spectrum, quality.wavelengths)
@@ -59,8 +59,8 @@ def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
     Parameters
     ----------
     project : Project
-        Its first light is moved about; its spectrum and disc stay, its intensity becomes 1. The distance of a near
-        light is taken from the camera to it, whatever its direction.
+        The flare varies the angle of its first light. Spectrum and size are kept, the intensity becomes 1. The distance
+        of a near light is measured from the camera to the light in any direction.
     threads : int, optional
 
     Returns
@@ -71,17 +71,17 @@ def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
     Raises
     ------
     FlarewrightError
-        As `settle`, and later as `render`.
+        As `settle`, and when drawing as `render`.
     """
     light = project.lights[0].replace(intensity=1.0, field_deg=(0.0, 0.0))
     prepared = project.replace(lights=(light,), output=Output(layers="passes", starburst=False))
-    settled = settle(prepared)
-    # the lens is loaded once; what `settle` reads from the project besides it costs nothing
-    prepared = settled.project.replace(lens=as_lens(prepared.lens))
+    settled = resolve_project(prepared)
+    # open the lens once; `resolve_project` reads little else from the project
+    prepared = settled.project.replace(lens=settled.opened.lens)
     summary = render(prepared.replace(quality=Quality(mode="draft", wavelengths=3))).summary
 
     def draw(constellation_deg: float, roll_deg: float) -> Sequence[Layer]:
-        # the renderer measures along the axis
+        # the renderer measures the distance along the axis
         along = None if light.distance is None else light.distance * cos(radians(constellation_deg))
         there = light.replace(field_deg=field_angles(constellation_deg, roll_deg), distance=along)
         return render(prepared.replace(lights=(there,)), threads=threads).layers
@@ -103,19 +103,19 @@ def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
 
 
 def largest_constellation(distance: float | None, efl: float) -> float:
-    """Return the largest constellation, degrees: a near light must stay in front of the lens.
+    """Return the largest constellation at which a light is in front of the lens, degrees.
 
     Parameters
     ----------
     distance : float or None
-        Of the light from the camera, mm; None: far away.
+        Distance of the light from the camera, mm; None: infinite.
     efl : float
         Focal length, mm.
 
     Raises
     ------
     LensError
-        When the light stands in or right at the lens.
+        When the light is inside the lens or too close to it.
     """
     if distance is None:
         return REACH_DEG
@@ -140,14 +140,14 @@ def square_flare(project: Project, quality: Quality, *, threads: int | None = No
     Returns
     -------
     flare : Flare
-        Its luminance is right, its colours are not. Over a square as wide as the sensor's diagonal, or over the sensor
-        when no roll only turns the flare.
+        Its luminance is right, its colours are not. It covers a square as wide as the sensor's diagonal, or the sensor
+        if every roll changes the flare.
     frame : Frame
     """
     frame = Frame(*project.camera.sensor)
     project = luminous(project, quality.replace(paths=project.quality.paths))
     turned = project.replace(camera=_square(project, frame))
-    if _turns_by(settle(turned)) is not None:
+    if _turns_by(resolve_project(turned)) is not None:
         return lens_flare(turned, threads=threads), frame
     high = max(1, round(SIDE_PX * frame.height / frame.width))
     camera = project.camera.replace(size_px=(SIDE_PX, high), sensor_mm=(frame.width, frame.height))
@@ -159,8 +159,8 @@ def _square(project: Project, frame: Frame) -> Camera:
     return square
 
 
-def _turns_by(settled: Settled) -> float | None:
-    """Return the roll that only turns the flare, as `Flare.turns_by_deg`."""
+def _turns_by(settled: ResolvedProject) -> float | None:
+    """Return the roll that only rotates the flare, as `Flare.turns_by_deg`."""
     iris, dirt = settled.iris, settled.project.dirt
     if iris.mask is not None or (dirt.in_ghosts and dirt != Dirt()):
         return None

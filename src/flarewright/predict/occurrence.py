@@ -1,4 +1,4 @@
-"""The occurrence of flare for one camera: curves, their extremes and bins, contrast, and how far all of it holds."""
+"""Predict the flare of one camera: curves, their extremes and bins, contrast, and a check of their accuracy."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..render.glare import VeilingGlare
+from ..render.scattering.veiling_glare import VeilingGlare
+from ..typing import Floats, Pixels, Progress
 from .contrast import contrast
-from .curves import Check, Curves, Progress, bins_of, check_curves, sample_curves
+from .curves import Check, Curves, bins_of, check_curves, sample_curves
 from .flare import Flare, Frame
 from .statistics import NAMES
 from .table import FlareTable, Memory
 
-Floats = NDArray[np.float64]
-
-# pictures in the report
+# number of pictures in the report
 SHOWN = 8
 
 __all__ = ["Flares", "Occurrence", "Setting", "Wanted", "contrast_curve", "occurrence_data", "predict_occurrence"]
@@ -26,20 +24,20 @@ __all__ = ["Flares", "Occurrence", "Setting", "Wanted", "contrast_curve", "occur
 
 @dataclass(frozen=True)
 class Flares:
-    """One camera's flare in the forms that a prediction needs.
+    """One camera's flare in the qualities that a prediction needs.
 
     Attributes
     ----------
     sampled : Flare
-        For statistics, many times; one that turns covers a square.
+        For statistics; covers a square if it can be rotated.
     frame : Frame
-        The camera's sensor.
+        Sensor of the camera.
     quality : str
-        Of `sampled`: "draft", "final" or "measured".
+        Quality of `sampled`: "draft", "final" or "measured".
     judge : Flare or None
-        At full quality over the frame, with pixels as wide as those of `sampled`; None: there is nothing better.
+        At full quality over the frame, with pixels as wide as those of `sampled`; None: nothing better exists.
     shown : Flare
-        Over the frame, to be looked at.
+        Over the frame, for viewing.
     """
 
     sampled: Flare
@@ -51,14 +49,14 @@ class Flares:
 
 @dataclass(frozen=True)
 class Setting:
-    """What the curves are put into the context of.
+    """Light and scene that give the curves absolute values.
 
     Attributes
     ----------
     illuminance_lx : float
-        That the light gives on a plane facing it.
+        Illuminance by the light on a plane facing it.
     luminance_cd_m2 : tuple of float or None
-        Darkest and brightest of the scene; None: no scene, no contrast.
+        Darkest and brightest luminance of the scene; None: no contrast is computed.
     """
 
     illuminance_lx: float = 1e5
@@ -67,18 +65,18 @@ class Setting:
 
 @dataclass(frozen=True)
 class Wanted:
-    """What to predict.
+    """Settings of a prediction.
 
     Attributes
     ----------
     to_deg : float or None
-        Largest constellation; None: as far as the flare is known.
+        Largest constellation; None: the largest known one.
     roll_deg : float
     tolerance : float
     samples : int
         As in `curves.sample_curves`.
     checks : int
-        Constellations at which the judge is asked.
+        Number of constellations at which the curves are compared with `Flares.judge`.
     bins : int
     setting : Setting
     pictures : bool
@@ -96,12 +94,12 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Occurrence:
-    """What `flarewright predict LENS` tells.
+    """Result of `flarewright predict LENS`.
 
     Attributes
     ----------
     flare : Flare
-        As it was sampled.
+        The flare that was sampled.
     frame : Frame
     quality : str
         "draft", "final" or "measured".
@@ -111,7 +109,7 @@ class Occurrence:
     glare : VeilingGlare or None
     setting : Setting
     pictures : tuple of (float, ndarray)
-        Constellations and linear pictures of them, shape (H, W, 3).
+        Constellations and their linear pictures, shape (H, W, 3).
     """
 
     flare: Flare
@@ -122,46 +120,46 @@ class Occurrence:
     check: Check | None
     glare: VeilingGlare | None
     setting: Setting
-    pictures: tuple[tuple[float, NDArray[np.float32]], ...] = ()
+    pictures: tuple[tuple[float, Pixels], ...] = ()
 
     @property
     def veil_cd_m2(self) -> Floats:
-        """Mean flare as the luminance of a scene that would light the sensor as much, over the constellation."""
+        """Luminance of a scene that would give the sensor the same mean illuminance as the flare, per constellation."""
         lux = self.setting.illuminance_lx if self.flare.per_lux else 1.0
         return self.curves.column("mean") * lux / self.flare.scene_scale
 
 
 def predict_occurrence(
-    flares: Flares, wanted: Wanted, told: Callable[[str], Progress], memory: Memory | None = None
+    flares: Flares, wanted: Wanted, reported: Callable[[str], Progress], memory: Memory | None = None
 ) -> Occurrence:
-    """Sample, check and picture the flare of a camera over the constellation.
+    """Sample, check and draw the flare of a camera over the constellation.
 
     Parameters
     ----------
     flares : Flares
     wanted : Wanted
-    told : callable
-        Returns where progress of a named part of the work is told.
+    reported : callable
+        Called with the name of a part of the work; returns the progress callback of that part.
     memory : dict, optional
-        Pictures drawn before; new ones are added to it.
+        Pictures drawn before; new ones are added.
 
     Returns
     -------
     Occurrence
-        Without the veiling glare, which takes a lens.
+        Without the veiling glare, which requires a lens.
     """
     known: Memory = {} if memory is None else memory
     table = FlareTable(flares.sampled, flares.frame, drawn=known.setdefault(flares.sampled.fingerprint, {}))
     curves = sample_curves(
         table, to_deg=wanted.to_deg, roll_deg=wanted.roll_deg, tolerance=wanted.tolerance, most=wanted.samples,
-        progress=told("curves"),
+        progress=reported("curves"),
     )  # fmt: skip
     check = None
     if flares.judge is not None and wanted.checks > 0:
-        check = check_curves(curves, flares.judge, wanted.checks, told("checks"))
+        check = check_curves(curves, flares.judge, wanted.checks, reported("checks"))
     pictures = []
     if wanted.pictures:
-        progress = told("pictures")
+        progress = reported("pictures")
         for k, angle in enumerate(angles := _worth_a_look(curves)):
             pictures.append((angle, flares.shown.picture(angle, wanted.roll_deg)))
             progress((k + 1) / len(angles), f"{angle:.1f} degrees")
@@ -171,7 +169,7 @@ def predict_occurrence(
 
 
 def _worth_a_look(curves: Curves) -> list[float]:
-    """Choose constellations for pictures: the extremes, and an even spread over where most of the flare is."""
+    """Choose constellations for pictures: the extremes, and even spacing over the range with flare."""
     at, flux = curves.constellation_deg, curves.column("sum_mm2")
     lit = at[flux > 0.01 * flux.max()] if flux.max() > 0.0 else at
     chosen = {float(at[int(np.argmax(curves.column(name)))]) for name in ("maximum", "log_average")}
@@ -189,7 +187,7 @@ def contrast_curve(found: Occurrence) -> Floats | None:
 
 
 def occurrence_data(found: Occurrence) -> dict[str, Any]:
-    """Return all of it as what `--json` prints."""
+    """Return the prediction as the data that `--json` prints."""
     curves, flare = found.curves, found.flare
     at = curves.constellation_deg
     statistics: dict[str, Any] = {}

@@ -1,15 +1,18 @@
-"""The HTML report of one camera's flare over the constellation."""
+"""HTML report of one camera's flare over the constellation."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..render.chart import COLOURS, Series, chart, number
-from ..render.display import auto_exposure, view
-from ..render.page import figures, image, page, paragraph, remark_list, section, table
+from ..io.images.html_page import html_page
+from ..render.image.display import auto_exposure, view
+from ..render.plots.chart import COLOURS, Series, chart, number
+from ..render.plots.svg import Chart
+from ..typing import Pixels
 from .curves import bins_of
 from .occurrence import Occurrence, contrast_curve
 from .statistics import NAMES
@@ -28,7 +31,7 @@ __all__ = ["WORDS", "occurrence_page", "shown_together"]
 
 
 def occurrence_page(found: Occurrence) -> str:
-    """Return the report.
+    """Return the report of a prediction.
 
     Parameters
     ----------
@@ -39,24 +42,16 @@ def occurrence_page(found: Occurrence) -> str:
     str
         HTML.
     """
-    flare, curves = found.flare, found.curves
-    efl = "" if flare.efl is None else f"{flare.efl:.4g} mm, "
-    lead = (
-        f"{flare.name}, {efl}{flare.aperture}, sensor {found.frame.width:g} x {found.frame.height:g} mm, "
-        f"{found.quality} quality, {len(curves.constellation_deg)} constellations. Values are {flare.unit}; "
-        f"{flare.left_out}."
-    )
-    parts = [section("Flare over the constellation", _charts(found), _extremes(found))]
-    if found.pictures:
-        parts.append(section("What it looks like", _pictures(found)))
-    parts.append(section("In context", _context(found)))
-    if found.check is not None:
-        parts.append(section("How far this holds", _check(found)))
-    parts.append(remark_list(flare.remarks))
-    return page(f"Flare of {flare.name}", lead, parts)
+    shown, stops = shown_together([picture for _, picture in found.pictures])
+    return html_page(
+        "occurrence", title=f"Flare of {found.flare.name}", found=found, flare=found.flare,
+        efl="" if found.flare.efl is None else f"{found.flare.efl:.4g} mm, ", charts=_charts(found),
+        extremes=_extremes(found), stops=stops, context=_context(found), checked=_check(found),
+        pictures=[(pixels, f"{angle:.4g} degrees") for pixels, (angle, _) in zip(shown, found.pictures, strict=True)],
+    )  # fmt: skip
 
 
-def _charts(found: Occurrence) -> str:
+def _charts(found: Occurrence) -> list[Chart]:
     at = found.curves.constellation_deg
     drawn = []
     for k, name in enumerate(_DRAWN):
@@ -67,37 +62,23 @@ def _charts(found: Occurrence) -> str:
             series.append(Series("", found.check.constellation_deg, rendered, "#22313f", 0.0))
         edges, _ = bins_of(values, found.bins)
         drawn.append(chart(WORDS[name], series, x_label=_ANGLE, logarithmic=True, bands=edges[1:-1].tolist()))
-    words = (
-        f"Lines across divide each curve's range into {found.bins} even bins between its extremes (Walch 2017, section "
-        "9.2)."
-    )
-    dots = " Dots are renders of their own." if found.check is not None else ""
-    return figures(*drawn) + paragraph(words + dots)
+    return drawn
 
 
-def _extremes(found: Occurrence) -> str:
+def _extremes(found: Occurrence) -> list[tuple[str, ...]]:
     at = found.curves.constellation_deg
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name in NAMES:
         values = found.curves.column(name)
         low, high = int(np.argmin(values)), int(np.argmax(values))
         worst = at[bins_of(values, found.bins)[1] == found.bins]
         span = "-" if worst.size == 0 or values[high] == values[low] else f"{worst.min():.3g} to {worst.max():.3g}"
         rows.append((WORDS[name], number(values[low]), f"{at[low]:.4g}", number(values[high]), f"{at[high]:.4g}", span))
-    head = ("estimator", "least", "at, degrees", "most", "at, degrees", "worst bin lies within, degrees")
-    return table(head, rows)
+    return rows
 
 
-def _pictures(found: Occurrence) -> str:
-    shown, stops = shown_together([picture for _, picture in found.pictures])
-    images = "".join(
-        image(pixels, f"{angle:.4g} degrees", 232) for pixels, (angle, _) in zip(shown, found.pictures, strict=True)
-    )
-    return images + paragraph(f"All at one exposure, {stops:+.1f} stops; {found.flare.left_out}.")
-
-
-def shown_together(pictures: Sequence[NDArray[np.float32]]) -> tuple[list[NDArray[np.uint8]], float]:
-    """Turn linear pictures into 8 bits at one exposure that shows the brightest without burning it out.
+def shown_together(pictures: Sequence[Pixels]) -> tuple[list[NDArray[np.uint8]], float]:
+    """Convert linear pictures to 8 bits at one exposure at which the brightest is not clipped.
 
     Parameters
     ----------
@@ -113,12 +94,10 @@ def shown_together(pictures: Sequence[NDArray[np.float32]]) -> tuple[list[NDArra
     return [view(picture, stops) for picture in pictures], stops
 
 
-def _context(found: Occurrence) -> str:
+def _context(found: Occurrence) -> dict[str, Any]:
     if not np.isfinite(found.flare.scene_scale):
-        return paragraph(
-            "There is no scene to compare with: say what value a scene of 1 cd/m² has in the captures with "
-            "--unit-per-cd-m2."
-        )
+        words = "There is no scene to compare with: give the value of a scene of 1 cd/m² in the captures with "
+        return {"charts": (), "words": words + "--unit-per-cd-m2."}
     at, setting = found.curves.constellation_deg, found.setting
     veil = found.veil_cd_m2
     drawn = [
@@ -135,7 +114,7 @@ def _context(found: Occurrence) -> str:
     if ratio is not None and setting.luminance_cd_m2 is not None:
         low, high = setting.luminance_cd_m2
         drawn.append(
-            chart("contrast left, K_real / K_ideal", [Series("", at, ratio, COLOURS[1])], x_label=_ANGLE)
+            chart("remaining contrast, K_real / K_ideal", [Series("", at, ratio, COLOURS[1])], x_label=_ANGLE)
         )  # fmt: skip
         worst = int(np.argmin(ratio))
         words += (
@@ -147,12 +126,13 @@ def _context(found: Occurrence) -> str:
             f" The scene itself veils the lens too: its veiling glare index is {found.glare.index:.2%} at "
             f"{found.glare.wavelength_nm:.0f} nm."
         )
-    return figures(*drawn) + paragraph(words)
+    return {"charts": drawn, "words": words}
 
 
-def _check(found: Occurrence) -> str:
-    assert found.check is not None
+def _check(found: Occurrence) -> dict[str, Any] | None:
     check = found.check
+    if check is None:
+        return None
     rows = []
     for k, angle in enumerate(check.constellation_deg):
         cells = [f"{angle:.4g}"]
@@ -163,8 +143,4 @@ def _check(found: Occurrence) -> str:
     head = ["degrees"]
     for name in _DRAWN:
         head += [WORDS[name], "rendered"]
-    words = (
-        "Between the samples the curves are straight lines. Here they stand beside final renders of their own, with "
-        "all wavelengths and full detail, at constellations that were not sampled."
-    )
-    return paragraph(words) + table(head, rows)
+    return {"head": head, "rows": rows}

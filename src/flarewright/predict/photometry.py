@@ -1,13 +1,11 @@
-"""From lamps to light at a camera, and from light on a sensor to exposure."""
+"""Photometry: illuminance at a camera by lamps, and exposure of a sensor."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..optics.constellation import brightness_scale
-
-Floats = NDArray[np.float64]
+from ..optics.lens.field_angles import brightness_scale
+from ..typing import Floats
 
 CLIPPING_LX_S = 78.0
 """Exposure at which a sensor of ISO 1 clips, lx s (ISO 12232, saturation-based speed: S = 78 / H_sat)."""
@@ -21,7 +19,7 @@ def point_illuminance(intensity_cd: float, distance_m: Floats) -> Floats:
 
 
 def disc_illuminance(luminance_cd_m2: float, diameter_m: float, distance_m: Floats) -> Floats:
-    """Compute the illuminance on a plane that faces an evenly bright disc on its axis.
+    """Compute the illuminance on a plane that faces a uniform disc on its axis.
 
     Parameters
     ----------
@@ -31,29 +29,29 @@ def disc_illuminance(luminance_cd_m2: float, diameter_m: float, distance_m: Floa
     Returns
     -------
     ndarray
-        lx.
+        Illuminance, lx.
 
     Notes
     -----
-    E = pi L r^2 / (r^2 + d^2); far away L times the solid angle of equation 8.3, close to it pi L.
+    E = pi L r^2 / (r^2 + d^2); for large d this is L times the solid angle of equation 8.3, at the disc pi L.
     """
     r = 0.5 * diameter_m
     return np.asarray(np.pi * luminance_cd_m2 * r**2 / (r**2 + distance_m**2))
 
 
 def beam(off_axis_deg: Floats, beam_deg: float) -> Floats:
-    """Return the part of its intensity that a lamp gives off its aim.
+    """Return the relative intensity of a lamp at an angle from its aim.
 
     Parameters
     ----------
     off_axis_deg : ndarray
     beam_deg : float
-        Across the cone at whose edge half of it is left.
+        Full angle of the cone at whose edge the intensity is one half.
 
     Returns
     -------
     ndarray
-        0 to 1: cos^n, with n so that it is one half at the edge; nothing backwards.
+        0 to 1: cos^n, with n such that it is one half at the edge; 0 backwards.
     """
     n = np.log(0.5) / np.log(np.cos(np.radians(0.5 * beam_deg)))
     forward = np.maximum(np.cos(np.radians(off_axis_deg)), 0.0)
@@ -61,12 +59,12 @@ def beam(off_axis_deg: Floats, beam_deg: float) -> Floats:
 
 
 def exposure_level(illuminance_lx: float, iso: float, exposure_s: float) -> float:
-    """Return the signal on the sensor over the one at which it clips.
+    """Return the sensor signal over its clipping level.
 
     Parameters
     ----------
     illuminance_lx : float
-        On the sensor.
+        Illuminance on the sensor.
     iso, exposure_s : float
 
     Notes

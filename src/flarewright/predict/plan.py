@@ -1,4 +1,4 @@
-"""A scene's flare: every light in every camera at every time, ranked."""
+"""Predict the flare of a scene: every light in every camera at every time, ranked."""
 
 from __future__ import annotations
 
@@ -8,25 +8,23 @@ from datetime import datetime
 from math import inf, log2
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..model.scene import Scene, SceneCamera, SceneLight
+from ..model.project.scene import Scene, SceneCamera, SceneLight
+from ..typing import Floats, Mask, Progress
 from .contrast import WASHED, contrast
-from .curves import Progress
 from .flare import Flare, Frame
 from .photometry import exposure_level
 from .statistics import NAMES
 from .table import FlareTable, Memory
-from .tracks import CameraTrack, Sighting, camera_track, moments, sightings
+from .tracks import CameraSighting, CameraTrack, camera_track, moments, sightings
 
-Floats = NDArray[np.float64]
 FlareMaker = Callable[[SceneCamera, SceneLight, float, float | None], tuple[Flare, Frame]]
 
-# between drawn constellations, degrees; lights smaller than this are drawn as points
+# distance between drawn constellations, degrees; lights smaller than the second number are drawn as points
 STEP_DEG, POINT_DEG = 2.0, 1.0
-# nearer than so many focal lengths a light's ghosts are no longer those of a distant one
+# distance, focal lengths, below which a light's ghosts differ from those of a distant light
 NEAR = 50.0
-# a distance that changes by less than this factor changes no ghost much
+# change of distance, as a factor, below which ghosts hardly change
 STAYS = 2.0
 
 __all__ = [
@@ -41,16 +39,16 @@ class Pair:
 
     Attributes
     ----------
-    sighting : Sighting
+    sighting : CameraSighting
     values : ndarray, shape (T, 5)
-        `statistics.NAMES`, in lx on the sensor (the sum in lx mm^2); NaN where it is not known.
+        `statistics.NAMES`, in lx on the sensor (the sum in lx mm^2); NaN where unknown.
     known : ndarray of bool, shape (T,)
-        Whether the camera's flare is known there.
+        Whether the camera's flare is known at that time.
     """
 
-    sighting: Sighting
+    sighting: CameraSighting
     values: Floats
-    known: NDArray[np.bool_]
+    known: Mask
 
     def column(self, name: str) -> Floats:
         """Return one statistic over time, shape (T,)."""
@@ -87,9 +85,9 @@ class Plan:
         return self.tables[camera][0].flare.scene_scale
 
     def veil(self, camera: int, light: int | None = None) -> Floats:
-        """Return the mean flare of one light, or of all together, as luminance of the scene, cd/m^2, shape (T,).
+        """Return the mean flare of one light or of all, as luminance of the scene, cd/m^2, shape (T,).
 
-        NaN where a light stands beyond what is known of the camera.
+        NaN where a light is outside the known range of the camera's flare.
         """
         chosen = self.pairs[camera] if light is None else [self.pairs[camera][light]]
         total = np.zeros(len(self.times_s))
@@ -99,14 +97,14 @@ class Plan:
 
     @property
     def ideal_contrast(self) -> float | None:
-        """K_ideal (equation 9.1), or None when the scene's luminance is not told."""
+        """K_ideal (equation 9.1), or None when the scene's luminance is unknown."""
         if self.scene.luminance_cd_m2 is None:
             return None
         low, high = self.scene.luminance_cd_m2
         return contrast(high, low, 0.0).k_ideal
 
     def contrast_left(self, veil_cd_m2: Floats) -> Floats | None:
-        """Return K_real / K_ideal under a veil (equation 9.3), or None when the scene's luminance is not told."""
+        """Return K_real / K_ideal under a veil (equation 9.3), or None when the scene's luminance is unknown."""
         if self.scene.luminance_cd_m2 is None:
             return None
         low, high = self.scene.luminance_cd_m2
@@ -125,26 +123,26 @@ class Plan:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A light in a camera, as the ranking tells it.
+    """Result of the ranking for a light in a camera.
 
     Attributes
     ----------
     camera, light : int
     known_share : float
-        Part of the time in which the camera's flare is known; all that follows is of it, and None where there is none.
+        Part of the time in which the camera's flare is known; the following values refer to it, None if it is 0.
     mean_veil_cd_m2 : float or None
-        Over time.
+        Mean over time.
     worst : int or None
-        Which time has the brightest veil.
+        Index of the time with the brightest veil.
     worst_veil_cd_m2 : float or None
     worst_constellation_deg : float or None
     contrast_left : float or None
         At that time.
     seen_share : float or None
-        Part of the time in which less than nine tenths of the contrast are left.
+        Part of the time in which less than nine tenths of the contrast remain.
     brightest_stops : float or None
-        Of the brightest spot, at any time, from where the sensor clips; above 0 it clips. None where a measured flare
-        does not tell where that is.
+        Exposure of the brightest spot at any time, relative to clipping; above 0 it clips. None if the clipping level
+        of a measured flare is unknown.
     """
 
     camera: int
@@ -160,19 +158,19 @@ class Ranked:
 
 
 def tables_of(
-    scene: Scene, seen: Sequence[Sequence[Sighting]], maker: FlareMaker, memory: Memory | None = None
+    scene: Scene, seen: Sequence[Sequence[CameraSighting]], maker: FlareMaker, memory: Memory | None = None
 ) -> tuple[tuple[FlareTable, ...], ...]:
-    """Make the tables of all cameras and lights; what draws the same is drawn once.
+    """Build the tables of all cameras and lights; equal flares share their pictures.
 
     Parameters
     ----------
     scene : Scene
     seen : sequence of sequence of Sighting
     maker : callable
-        (camera, light, diameter_deg, distance_m) to a flare for tables and the camera's frame; a distance of None is
-        far away.
+        Maps (camera, light, diameter_deg, distance_m) to a flare for tables and the camera's frame; a distance of None
+        is infinite.
     memory : dict, optional
-        Pictures drawn before, by the flares' fingerprints; new ones are added to it.
+        Pictures drawn before, by the flares' fingerprints; new ones are added.
 
     Returns
     -------
@@ -190,19 +188,21 @@ def tables_of(
     return tuple(out)
 
 
-def near_or_far(maker: FlareMaker, camera: SceneCamera, light: SceneLight, sighting: Sighting) -> tuple[Flare, Frame]:
-    """Return the flare of a light as far away as it is, and the camera's frame."""
+def near_or_far(
+    maker: FlareMaker, camera: SceneCamera, light: SceneLight, sighting: CameraSighting
+) -> tuple[Flare, Frame]:
+    """Return the flare of a light at its distance, and the camera's frame."""
     size = rounded_diameter(sighting)
     flare, frame = maker(camera, light, size, None)
     distance = rounded_distance(sighting, flare.efl)
     return (flare, frame) if distance is None else maker(camera, light, size, distance)
 
 
-def rounded_distance(sighting: Sighting, efl_mm: float | None) -> float | None:
-    """Return the distance a light is drawn at, m: its middle one over time, rounded so that few are drawn.
+def rounded_distance(sighting: CameraSighting, efl_mm: float | None) -> float | None:
+    """Return the distance at which a light is drawn, m: its median over time, rounded so that few are drawn.
 
-    None where it never comes within `NEAR` focal lengths, or the focal length is not known: a measured flare's light
-    stood where it stood. Else half an octave's multiple of 1 m.
+    None (infinite) if it never comes within `NEAR` focal lengths, or if the focal length is unknown, as for a measured
+    flare, whose light had a fixed distance. Otherwise 1 m times a power of the square root of two.
     """
     lit = sighting.illuminance_lx > 0.0
     if efl_mm is None or not lit.any() or sighting.distance_m[lit].min() >= 1e-3 * NEAR * abs(efl_mm):
@@ -210,27 +210,29 @@ def rounded_distance(sighting: Sighting, efl_mm: float | None) -> float | None:
     return float(2.0 ** (0.5 * round(2.0 * log2(float(np.median(sighting.distance_m[lit]))))))
 
 
-def rounded_diameter(sighting: Sighting) -> float:
-    """Return the size a light is drawn with, its largest over time, rounded so that few are drawn.
+def rounded_diameter(sighting: CameraSighting) -> float:
+    """Return the angular diameter at which a light is drawn: its largest over time, rounded so that few are drawn.
 
-    Below a degree it is a point, three times as fast: the mean stays within a thousandth, the brightest spots come out
-    up to a tenth brighter. Above, it is a power of two degrees.
+    Below one degree it is a point, which is three times as fast: the mean changes by less than a thousandth, the
+    brightest spots become up to a tenth brighter. Above, it is a power of two degrees.
     """
     lit = sighting.illuminance_lx > 0.0
     largest = float(sighting.diameter_deg[lit].max()) if lit.any() else 0.0
     return 0.0 if largest < POINT_DEG else min(2.0 ** round(log2(largest)), 32.0)
 
 
-def plan_scene(scene: Scene, maker: FlareMaker, told: Callable[[str], Progress], memory: Memory | None = None) -> Plan:
-    """Follow cameras and lights, and measure the flare of all of them.
+def plan_scene(
+    scene: Scene, maker: FlareMaker, reported: Callable[[str], Progress], memory: Memory | None = None
+) -> Plan:
+    """Compute the positions of cameras and lights over time, and the flare of all pairs.
 
     Parameters
     ----------
     scene : Scene
     maker : callable
         As in `tables_of`.
-    told : callable
-        Returns where progress of a named part of the work is told.
+    reported : callable
+        Called with the name of a part of the work; returns the progress callback of that part.
     memory : dict, optional
         As in `tables_of`.
 
@@ -241,13 +243,13 @@ def plan_scene(scene: Scene, maker: FlareMaker, told: Callable[[str], Progress],
     Raises
     ------
     FlarewrightError
-        When a lens cannot be used, or camera and light do not fit together.
+        When a lens cannot be used, or a light is at a camera's position.
     """
     times, dates = moments(scene)
     tracks = tuple(camera_track(one, times, f"cameras[{c}] ({one.name})") for c, one in enumerate(scene.cameras))
     seen = sightings(scene, tracks, times, dates)
     tables = tables_of(scene, seen, maker, memory)
-    draw_ahead(tables, seen, told("flares"))
+    draw_ahead(tables, seen, reported("flares"))
     pairs, remarks = [], []
     for c, (camera, row) in enumerate(zip(scene.cameras, seen, strict=True)):
         remarks += [f"{camera.name}: {remark}" for table in tables[c] for remark in table.flare.remarks]
@@ -255,13 +257,15 @@ def plan_scene(scene: Scene, maker: FlareMaker, told: Callable[[str], Progress],
         for k, (light, sighting) in enumerate(zip(scene.lights, row, strict=True)):
             pair = _measured(tables[c][k], sighting)
             line.append(pair)
-            remarks += _doubts(camera, light, tables[c][k].flare, pair)
+            remarks += _pair_remarks(camera, light, tables[c][k].flare, pair)
         pairs.append(tuple(line))
     return Plan(scene, times, dates, tracks, tables, tuple(pairs), tuple(dict.fromkeys(remarks)))
 
 
-def draw_ahead(tables: Sequence[Sequence[FlareTable]], seen: Sequence[Sequence[Sighting]], progress: Progress) -> None:
-    """Draw every picture that the sightings need, so that progress and what is left are known."""
+def draw_ahead(
+    tables: Sequence[Sequence[FlareTable]], seen: Sequence[Sequence[CameraSighting]], progress: Progress
+) -> None:
+    """Draw every picture that the sightings need, so that the progress is known."""
     wanted: dict[tuple[str, float, float], FlareTable] = {}
     for row, line in zip(tables, seen, strict=True):
         for table, sighting in zip(row, line, strict=True):
@@ -276,7 +280,7 @@ def draw_ahead(tables: Sequence[Sequence[FlareTable]], seen: Sequence[Sequence[S
         progress((k + 1) / len(wanted), f"{table.flare.name}, {node:.4g} degrees")
 
 
-def _measured(table: FlareTable, sighting: Sighting) -> Pair:
+def _measured(table: FlareTable, sighting: CameraSighting) -> Pair:
     angles, lux = sighting.constellation_deg, sighting.illuminance_lx
     inside = table.flare.covers(angles)
     known = inside | table.flare.dark_beyond | (lux == 0.0)
@@ -286,22 +290,22 @@ def _measured(table: FlareTable, sighting: Sighting) -> Pair:
     return Pair(sighting, values, known)
 
 
-def _doubts(camera: SceneCamera, light: SceneLight, flare: Flare, pair: Pair) -> list[str]:
-    told = []
+def _pair_remarks(camera: SceneCamera, light: SceneLight, flare: Flare, pair: Pair) -> list[str]:
+    reported = []
     unknown = float(np.mean(~pair.known))
     if unknown > 0.0:
-        told.append(
+        reported.append(
             f"{camera.name} was measured from {flare.least_deg:g} to {flare.reach_deg:g} degrees; {light.name} stands "
             f"elsewhere in {unknown:.0%} of the times, in which its flare is not known"
         )
     drawn = rounded_distance(pair.sighting, flare.efl)
     lit = pair.sighting.distance_m[pair.sighting.illuminance_lx > 0.0]
     if drawn is not None and float(lit.max() / lit.min()) > STAYS:
-        told.append(
-            f"{light.name} comes within {lit.min():.3g} m of {camera.name} and goes {lit.max():.3g} m away: its ghosts "
-            f"are drawn as if it stayed {drawn:.3g} m away, its brightness follows"
+        reported.append(
+            f"{light.name} moves between {lit.min():.3g} m and {lit.max():.3g} m from {camera.name}: its ghosts are "
+            f"drawn for a distance of {drawn:.3g} m, only its brightness follows"
         )
-    return told
+    return reported
 
 
 def ranking(plan: Plan) -> list[Ranked]:
@@ -314,7 +318,7 @@ def ranking(plan: Plan) -> list[Ranked]:
     Returns
     -------
     list of Ranked
-        Those of which nothing is known stand behind all others, for nobody can rank them.
+        Pairs whose flare is unknown come last.
     """
     out = []
     for c, camera in enumerate(plan.scene.cameras):
@@ -345,7 +349,7 @@ def ranking(plan: Plan) -> list[Ranked]:
 
 
 def _level(peak: float, camera: SceneCamera, flare: Flare) -> float:
-    """Return the signal of a flare's brightest spot over the one at which the sensor clips; 0: not known, or none."""
+    """Return the signal of a flare's brightest spot over its clipping level; 0 when unknown or dark."""
     if camera.model is None:
         return exposure_level(peak, camera.iso, camera.exposure_s)
     return 0.0 if flare.over_clipping is None else peak * flare.over_clipping

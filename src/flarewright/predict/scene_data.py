@@ -1,4 +1,4 @@
-"""A planned scene as data: what `--json` prints."""
+"""A planned scene as the data that `--json` prints."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..render.chart import number
-from ..render.glare import VeilingGlare
+from ..render.plots.chart import number
+from ..render.scattering.veiling_glare import VeilingGlare
 from .plan import Plan, Ranked
-from .search import WORTH, Found
+from .search import WORTH, BestPosition
 from .statistics import NAMES
 from .switching import Shot
 from .worst import Worst
@@ -19,7 +19,7 @@ __all__ = ["found_words", "scene_data", "time_words", "unknown_share"]
 
 
 def time_words(plan: Plan, index: int) -> str:
-    """Name a time of a plan as a person does: the clock's where the scene tells it, else seconds."""
+    """Format a time of a plan: the clock time if the scene has one, otherwise seconds."""
     if plan.dates is None:
         return f"{plan.times_s[index]:.6g} s"
     date = plan.dates[index]
@@ -28,31 +28,31 @@ def time_words(plan: Plan, index: int) -> str:
 
 
 def unknown_share(plan: Plan, shot: Shot) -> float:
-    """Return in which part of a shot's times the camera's flare is not known."""
+    """Return the part of a shot's times at which the camera's flare is unknown."""
     return float(np.isnan(plan.veil(shot.camera)[shot.first : shot.until + 1]).mean())
 
 
-def found_words(plan: Plan, found: Found) -> str:
-    """Say in a sentence what a search for a better position came to."""
+def found_words(plan: Plan, found: BestPosition) -> str:
+    """Describe the result of a search for a better position in one sentence."""
     name = plan.scene.cameras[found.camera].name
     tried, old = len(found.veils_cd_m2) - 1, float(found.veils_cd_m2[0])
     if not found.moments:
         return (
-            f"what flare {name} has where it stands is not known, for its lights stand beyond what was measured, so no "
-            "position can be told to be better"
+            f"the flare of {name} at its position is not known, because its lights are outside the measured range: "
+            "no position can be compared"
         )
     unknown = int(np.isnan(found.veils_cd_m2).sum())
     about = f"of {tried} positions within {found.radius_m:g} m of {name}"
-    limits = [f"{unknown} of which stand where its flare is not known"] if unknown else []
+    limits = [f"{unknown} of which are where its flare is not known"] if unknown else []
     if found.unknown:
         times = found.moments + found.unknown
-        limits.append(f"at the {found.moments} of {times} times at which it is known where it stands")
+        limits.append(f"at the {found.moments} of {times} times at which the flare at its position is known")
     about += "".join(f", {one}" for one in limits) + ("," if limits else "")
     if old == 0.0:
-        return f"{name} has no flare where it stands; none {about} can be better"
+        return f"{name} has no flare at its position; none {about} can be better"
     if not found.better:
         gain = 1.0 - float(found.veils_cd_m2[found.best]) / old
-        return f"none {about} takes away as much as {WORTH:.0%} of the flare (the best {gain:.1%}): it stands well"
+        return f"none {about} removes {WORTH:.0%} of the flare or more (the best {gain:.1%}): the position is good"
     new = float(found.veils_cd_m2[found.best])
     x, y, z = (float(part) for part in found.offsets_m[found.best])
     level = f", {abs(z):.3g} m {'higher' if z > 0 else 'lower'}" if abs(z) > 0.005 else ""
@@ -66,21 +66,21 @@ def scene_data(
     plan: Plan,
     ranked: Sequence[Ranked],
     shots: Sequence[Shot],
-    found: Found | None,
+    found: BestPosition | None,
     worst: Sequence[Worst] = (),
     glare: Sequence[VeilingGlare | None] = (),
 ) -> dict[str, Any]:
-    """Return a planned scene as JSON holds it.
+    """Return a planned scene as data for JSON.
 
     Parameters
     ----------
     plan : Plan
     ranked : sequence of Ranked
     shots : sequence of Shot
-        Which camera when; empty for one camera.
-    found : Found or None
+        Order of cameras over time; empty for one camera.
+    found : BestPosition or None
     worst : sequence of Worst
-        Final renders of their own at the worst times.
+        Final renders of the worst times.
     glare : sequence of VeilingGlare or None
         By camera.
     """
@@ -137,7 +137,7 @@ def scene_data(
 
 
 def _rendered(worst: Worst | None) -> dict[str, Any]:
-    """Return what a render of its own says of a worst time."""
+    """Return the values of the separate render of a worst time."""
     return {
         "rendered_veil_cd_m2": None if worst is None else worst.veil_cd_m2,
         "washed_share": None if worst is None else worst.washed,

@@ -1,48 +1,47 @@
-"""The HTML report of a scene: ranking, flare over time, which camera when, a plan, and what the worst looks like."""
+"""HTML report of a scene: ranking, flare over time, choice of cameras, plan view, and renders of the worst moments."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..model.scene import Lamp
-from ..render.chart import COLOURS, Series, chart, number
-from ..render.display import view
-from ..render.figure import FAINT, INK, Box, Figure, Line, Mark, Text
-from ..render.page import figures, image, page, paragraph, remark_list, section, table
+from ..io.images.html_page import html_page
+from ..model.project.scene import Lamp
+from ..render.image.display import view
+from ..render.plots.chart import COLOURS, Series, chart, number
+from ..render.plots.svg import FAINT, INK, Box, Chart, Line, Mark, Text
+from ..typing import Floats
 from .occurrence_page import shown_together
 from .plan import Plan, Ranked
 from .scene_data import found_words, time_words, unknown_share
-from .search import Found
+from .search import BestPosition
 from .switching import Shot
 from .tracks import lamp_places
 from .worst import Worst
 
-Floats = NDArray[np.float64]
-
-# lines in a chart, rows in the ranking
+# largest number of lines in a chart, and of rows in the ranking
 LINES, ROWS = 8, 40
-# of 255, and values: a picture with fewer as bright as this shows nothing
+# a picture with fewer values (second number) of at least this brightness, of 255, is left out as dark
 DARKEST_SHOWN, FEWEST_SHOWN = 6, 60
-# tried positions whose flare is not known
+# colour of tried positions whose flare is unknown
 _UNKNOWN = "#c3ccd4"
 
 __all__ = ["scene_page"]
 
 
 def scene_page(
-    plan: Plan, ranked: Sequence[Ranked], shots: Sequence[Shot], found: Found | None, worst: Sequence[Worst]
+    plan: Plan, ranked: Sequence[Ranked], shots: Sequence[Shot], found: BestPosition | None, worst: Sequence[Worst]
 ) -> str:
-    """Return the report.
+    """Return the report of a plan.
 
     Parameters
     ----------
     plan : Plan
     ranked : sequence of Ranked
     shots : sequence of Shot
-    found : Found or None
+    found : BestPosition or None
     worst : sequence of Worst
 
     Returns
@@ -50,49 +49,30 @@ def scene_page(
     str
         HTML.
     """
-    scene = plan.scene
     span = time_words(plan, 0)
     if len(plan.times_s) > 1:
         span = f"{span} to {time_words(plan, len(plan.times_s) - 1)}, {len(plan.times_s)} times"
         if plan.dates is not None:
             span = f"{plan.dates[0]:%Y-%m-%d} {span}"
-    lead = (
-        f"{len(scene.cameras)} cameras, {len(scene.lights)} lights, {span}. The veil is the mean flare in the picture, "
-        "told as the luminance that a scene would need to light the sensor as much; the light's own image is left out, "
-        "and nothing hides a light but the horizon the sun."
-    )
-    parts = [section("Ranking", _ranking(plan, ranked))]
-    if len(plan.times_s) > 1:
-        parts.append(section("Over time", _over_time(plan)))
-    if shots:
-        parts.append(section("Which camera when", _shots(plan, shots)))
-    tried = "Small squares are positions that were tried: green with little flare, red with much, grey where it is not "
-    tried += "known."
-    parts.append(
-        section("Plan", figures(_map(plan, found)), paragraph(tried) if found is not None and found.moments else "")
-    )
-    if found is not None:
-        parts.append(section("A better position", paragraph(_sentence(found_words(plan, found)))))
-    if worst:
-        parts.append(section("The worst moments", _worst(plan, worst)))
-    parts.append(remark_list(plan.remarks))
-    return page(f"Flare plan: {scene.name}", lead, parts)
+    better = "" if found is None else f"{found_words(plan, found)}."
+    return html_page(
+        "scene", title=f"Flare plan: {plan.scene.name}", plan=plan, span=span, ranking=_ranking(plan, ranked),
+        over_time=_over_time(plan) if len(plan.times_s) > 1 else (), shots=_shots(plan, shots) if shots else None,
+        map=_map(plan, found), found=found, better=better[:1].upper() + better[1:],
+        worst=_worst(plan, worst) if worst else None,
+    )  # fmt: skip
 
 
-def _sentence(words: str) -> str:
-    return words[:1].upper() + words[1:] + "."
-
-
-def _ranking(plan: Plan, ranked: Sequence[Ranked]) -> str:
+def _ranking(plan: Plan, ranked: Sequence[Ranked]) -> dict[str, Any]:
     scene = plan.scene
-    told = scene.luminance_cd_m2 is not None
+    reported = scene.luminance_cd_m2 is not None
     moving = len(plan.times_s) > 1
     head = ["camera", "light", "mean veil, cd/m²" if moving else "veil, cd/m²"]
     head += ["worst, cd/m²", "at"] if moving else []
     head += ["degrees off axis"]
     doubted = any(one.known_share < 1.0 for one in ranked)
-    head += ["contrast left"] if told else []
-    head += ["time under 90 %"] if told and moving else []
+    head += ["remaining contrast"] if reported else []
+    head += ["time under 90 %"] if reported and moving else []
     head += ["brightest spot, stops from clipping"]
     head += ["known in"] if doubted else []
     rows = []
@@ -101,25 +81,22 @@ def _ranking(plan: Plan, ranked: Sequence[Ranked]) -> str:
         if one.worst is None:
             row += ["not known", *["-"] * (len(head) - 4), "0% of the times"]
         else:
-            row += [_told(one.mean_veil_cd_m2, number)]
-            row += [_told(one.worst_veil_cd_m2, number), time_words(plan, one.worst)] if moving else []
-            row += [_told(one.worst_constellation_deg, "{:.1f}".format)]
-            row += [_told(one.contrast_left, "{:.1%}".format)] if told else []
-            row += [_told(one.seen_share, "{:.0%}".format)] if told and moving else []
-            row += [_told(one.brightest_stops, "{:+.1f}".format)]
+            row += [_cell(one.mean_veil_cd_m2, number)]
+            row += [_cell(one.worst_veil_cd_m2, number), time_words(plan, one.worst)] if moving else []
+            row += [_cell(one.worst_constellation_deg, "{:.1f}".format)]
+            row += [_cell(one.contrast_left, "{:.1%}".format)] if reported else []
+            row += [_cell(one.seen_share, "{:.0%}".format)] if reported and moving else []
+            row += [_cell(one.brightest_stops, "{:+.1f}".format)]
             row += [f"{one.known_share:.0%} of the times"] if doubted else []
         rows.append(row)
-    left = len(ranked) - ROWS
-    words = "Numbers are of the times at which the camera's flare is known. " if doubted else ""
-    words += f"{left} fainter pairs are left out here." if left > 0 else ""
-    return table(head, rows) + (paragraph(words) if words else "")
+    return {"head": head, "rows": rows, "doubted": doubted, "left": max(len(ranked) - ROWS, 0)}
 
 
-def _told(value: float | None, words: Callable[[float], str]) -> str:
+def _cell(value: float | None, words: Callable[[float], str]) -> str:
     return "-" if value is None else words(value)
 
 
-def _over_time(plan: Plan) -> str:
+def _over_time(plan: Plan) -> list[Chart]:
     hours, ticks, label = _time_axis(plan)
     cameras = plan.scene.cameras
     veils = [
@@ -134,7 +111,7 @@ def _over_time(plan: Plan) -> str:
     if plan.scene.luminance_cd_m2 is not None:
         left = [Series(one.label, hours, plan.contrast_left(np.asarray(one.y)), one.colour) for one in veils]  # type: ignore[arg-type]
         drawn.append(
-            chart("contrast left, K_real / K_ideal", left, x_label=label, size=(700, 300), x_ticks=ticks)
+            chart("remaining contrast, K_real / K_ideal", left, x_label=label, size=(700, 300), x_ticks=ticks)
         )  # fmt: skip
     angles: list[Series] = []
     for c, camera in enumerate(cameras[:LINES]):
@@ -147,11 +124,11 @@ def _over_time(plan: Plan) -> str:
     drawn.append(
         chart("constellation, degrees off axis", angles, x_label=label, size=(700, 300), x_ticks=ticks)
     )  # fmt: skip
-    return figures(*drawn)
+    return drawn
 
 
 def _time_axis(plan: Plan) -> tuple[Floats, list[tuple[float, str]] | None, str]:
-    """Return places along the axis, ticks and its name: the clock where the scene tells it."""
+    """Return positions along the time axis, ticks and label: the clock time if the scene has one."""
     if plan.dates is None:
         return plan.times_s, None, "seconds"
     chosen = range(0, len(plan.dates), -(-len(plan.dates) // 9))
@@ -160,7 +137,7 @@ def _time_axis(plan: Plan) -> tuple[Floats, list[tuple[float, str]] | None, str]
     return plan.times_s, [(float(plan.times_s[k]), plan.dates[k].strftime(form)) for k in chosen], "time"
 
 
-def _shots(plan: Plan, shots: Sequence[Shot]) -> str:
+def _shots(plan: Plan, shots: Sequence[Shot]) -> dict[str, Any]:
     width, left = 700, 130.0
     cameras = plan.scene.cameras
     height = 40 + 22 * len(cameras)
@@ -180,18 +157,19 @@ def _shots(plan: Plan, shots: Sequence[Shot]) -> str:
     for at, words in ticks or [(float(t), f"{t:.4g} s") for t in np.linspace(0.0, span, 7)]:
         marks.append(Text(left + at * across, height - 8.0, words, 10.0, FAINT, "middle"))
     rows = [(cameras[shot.camera].name, time_words(plan, shot.first), time_words(plan, shot.until)) for shot in shots]
-    head: tuple[str, ...] = ("camera", "from", "to")
-    unknown = [unknown_share(plan, shot) for shot in shots]
-    drawn = figures(Figure(width, height, "Which camera when", tuple(marks)))
     doubted = any(np.isnan(plan.veil(c)).any() for c in range(len(cameras)))
-    if not doubted:
-        return drawn + table(head, rows)
-    told = [(*row, f"{share:.0%} of the times") for row, share in zip(rows, unknown, strict=True)]
-    words = "A camera whose flare is not known is taken only where no other is known either."
-    return drawn + table((*head, "flare not known in"), told) + paragraph(words)
+    return {
+        "chart": Chart(width, height, "Which camera when", tuple(marks)),
+        "head": ("camera", "from", "to", *["flare not known in"] * doubted),
+        "rows": [
+            (*row, *[f"{unknown_share(plan, shot):.0%} of the times"] * doubted)
+            for row, shot in zip(rows, shots, strict=True)
+        ],
+        "doubted": doubted,
+    }
 
 
-def _map(plan: Plan, found: Found | None) -> Figure:
+def _map(plan: Plan, found: BestPosition | None) -> Chart:
     """Draw the plan from above: cameras with their views, lamps, directions of distant lights, tried positions."""
     size, edge = 560.0, 40.0
     spots = [track.position_m[:, :2] for track in plan.tracks] + [track.aim_m[:, :2] for track in plan.tracks]
@@ -237,11 +215,11 @@ def _map(plan: Plan, found: Found | None) -> Figure:
         Line([(14.0, size - 14.0), (14.0 + bar * scale, size - 14.0)], INK, 2.0),
         Text(14.0, size - 20.0, f"{bar:g} m", 10.0),
     ]
-    return Figure(int(size), int(size), "Plan from above", tuple(marks))
+    return Chart(int(size), int(size), "Plan from above", tuple(marks))
 
 
 def _far(plan: Plan, k: int, name: str, size: float) -> list[Mark]:
-    """Draw where a distant light comes from, at the edge of the plan: an arc over time."""
+    """Draw the direction of a distant light at the edge of the plan, as an arc over time."""
     track, seen = plan.tracks[0], plan.pairs[0][k].sighting
     angle, roll = np.radians(seen.constellation_deg), np.radians(seen.roll_deg)
     local = np.stack([np.sin(angle) * np.cos(roll), np.sin(angle) * np.sin(roll), np.cos(angle)], axis=-1)
@@ -264,7 +242,7 @@ def _far(plan: Plan, k: int, name: str, size: float) -> list[Mark]:
     return marks
 
 
-def _tried(plan: Plan, found: Found, place: Callable[[Floats], tuple[float, float]]) -> list[Mark]:
+def _tried(plan: Plan, found: BestPosition, place: Callable[[Floats], tuple[float, float]]) -> list[Mark]:
     marks: list[Mark] = []
     start = plan.tracks[found.camera].position_m[0]
     finite = found.veils_cd_m2[np.isfinite(found.veils_cd_m2)]
@@ -284,18 +262,18 @@ def _tried(plan: Plan, found: Found, place: Callable[[Floats], tuple[float, floa
     return marks
 
 
-def _worst(plan: Plan, worst: Sequence[Worst]) -> str:
+def _worst(plan: Plan, worst: Sequence[Worst]) -> dict[str, Any]:
     scene = plan.scene
     pictures = [one.picture for one in worst]
     if scene.luminance_cd_m2 is not None:
-        # the scene's brightest is white
+        # the brightest luminance of the scene is white
         stops = -float(np.log2(scene.luminance_cd_m2[1]))
         shown = [view(picture, stops) for picture in pictures]
         how = f"at the scene's exposure: white is {number(scene.luminance_cd_m2[1])} cd/m²"
     else:
         shown, stops = shown_together(pictures)
         how = "all at one exposure"
-    images = ""
+    images = []
     rows = []
     for found, pixels in zip(worst, shown, strict=True):
         one, mean = found.ranked, found.veil_cd_m2
@@ -304,28 +282,8 @@ def _worst(plan: Plan, worst: Sequence[Worst]) -> str:
         assert one.worst_veil_cd_m2 is not None
         words = f"{light} in {camera}, {time_words(plan, one.worst)}, {one.worst_constellation_deg:.1f} degrees"
         if np.count_nonzero(pixels >= DARKEST_SHOWN) >= FEWEST_SHOWN:
-            images += image(pixels, words, 232)
+            images.append((pixels, words))
         ratio = one.worst_veil_cd_m2 / mean if mean > 0.0 else float("nan")
-        rows.append(
-            (
-                camera,
-                light,
-                number(one.worst_veil_cd_m2),
-                number(mean),
-                number(ratio),
-                "-" if found.washed is None else f"{found.washed:.0%}",
-            )
-        )
-    head = (
-        "camera",
-        "light",
-        "predicted veil, cd/m²",
-        "of this picture",
-        "ratio",
-        "of the picture under 90 % contrast",
-    )
-    return (
-        images
-        + paragraph(f"Final renders, flare alone, {how}. Those with nothing to be seen are left out.")
-        + table(head, rows)
-    )
+        washed = "-" if found.washed is None else f"{found.washed:.0%}"
+        rows.append((camera, light, number(one.worst_veil_cd_m2), number(mean), number(ratio), washed))
+    return {"pictures": images, "how": how, "rows": rows}

@@ -1,4 +1,4 @@
-"""The best position near a given one: where a camera, aiming at the same place, sees the least flare."""
+"""Search a camera position with less flare near a given one, with the same aim point."""
 
 from __future__ import annotations
 
@@ -6,44 +6,41 @@ from dataclasses import dataclass
 from math import inf, nan
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ProjectError
-from .curves import Progress
+from ..typing import Floats, Progress
 from .plan import Plan
 from .tracks import camera_track, moved_by, sightings
 
-Floats = NDArray[np.float64]
-
-# a position is told as better when it takes away at least this part of the veil
+# least reduction of the veil for a position to count as better
 WORTH = 0.02
-# positions over the whole disc, then rounds about the best of so many in a disc this much smaller each time
+# positions over the whole disc; then rounds around the best, positions per round, and factor of the radius per round
 FIRST, ROUNDS, LATER, SMALLER = 61, 4, 16, 0.4
-# times looked at, evenly chosen
+# largest number of times that are evaluated, evenly chosen
 MOMENTS = 24
 
-__all__ = ["WORTH", "Found", "best_position"]
+__all__ = ["WORTH", "BestPosition", "best_position"]
 
 
 @dataclass(frozen=True)
-class Found:
-    """What a search found.
+class BestPosition:
+    """Result of a search.
 
     Attributes
     ----------
     camera : int
     radius_m, height_m : float
     offsets_m : ndarray, shape (N, 3)
-        Tried, the first is 0: the position as it is.
+        Offsets of the tried positions; the first is 0, the current position.
     veils_cd_m2 : ndarray, shape (N,)
-        Mean over these times of the veil of all lights; infinite where the camera cannot stand, NaN where its flare is
-        not known in one of them.
+        Mean over the evaluated times of the veil of all lights; infinite at invalid positions, NaN where the flare is
+        unknown at any of these times.
     best : int
-        Of those that are known; 0 where none is.
+        Index of the least known veil; 0 if there is none.
     moments : int
-        Times that were looked at.
+        Number of evaluated times.
     unknown : int
-        Times that were left out: what flare the camera has where it stands is not known then.
+        Number of skipped times, at which the flare at the current position is unknown.
     """
 
     camera: int
@@ -57,34 +54,34 @@ class Found:
 
     @property
     def better(self) -> bool:
-        """Whether there is a position worth moving to."""
+        """Whether a position is better by at least `WORTH`."""
         return bool(self.veils_cd_m2[self.best] < (1.0 - WORTH) * self.veils_cd_m2[0])
 
 
 def best_position(
     plan: Plan, camera: int, radius_m: float, height_m: float = 0.0, progress: Progress | None = None
-) -> Found:
-    """Look for less flare within a disc about a camera's position, or a flat cylinder.
+) -> BestPosition:
+    """Search less flare within a disc, or a flat cylinder, around a camera's position.
 
     Parameters
     ----------
     plan : Plan
     camera : int
     radius_m : float
-        Of the disc, level with the plan.
+        Radius of the horizontal disc.
     height_m : float
-        Up and down.
+        Largest change of height.
     progress : callable, optional
 
     Returns
     -------
-    Found
+    BestPosition
 
     Notes
     -----
-    Sunflower points over the disc, then smaller discs about the best; a moving camera moves as a whole and aims where
-    it did. Flare has narrow valleys, so a better position between the points may be missed: nothing here claims a
-    global best.
+    Points in a sunflower spiral over the disc, then over smaller discs around the best one. A moving camera is shifted
+    as a whole and keeps its aim points. Flare has narrow valleys, so a better position between the points can be
+    missed: the result is not a global optimum.
     """
     scene = plan.scene
     chosen = np.unique(np.round(np.linspace(0, len(plan.times_s) - 1, MOMENTS)).astype(np.int64))
@@ -92,7 +89,7 @@ def best_position(
     dates = None if plan.dates is None else tuple(plan.dates[t] for t in chosen)
     one = scene.cameras[camera]
     track = camera_track(one, times, one.name)
-    # positions are compared while it is known what flare there is now
+    # compare positions only at times at which the current flare is known
     known = np.all([pair.known[chosen] for pair in plan.pairs[camera]], axis=0)
 
     def veil(offset: Floats) -> float:
@@ -100,7 +97,7 @@ def best_position(
             moved = moved_by(track, offset, one, times, one.name)
             seen = sightings(scene, [moved], times, dates)[0]
         except ProjectError:
-            # on a lamp, or where it aims
+            # the position is on a lamp or on the aim point
             return inf
         total = 0.0
         for table, sighting in zip(plan.tables[camera], seen, strict=True):
@@ -115,7 +112,7 @@ def best_position(
 
     offsets = [np.zeros(3)]
     if not known.any():
-        return Found(camera, radius_m, height_m, np.array(offsets), np.array([nan]), 0, 0, len(times))
+        return BestPosition(camera, radius_m, height_m, np.array(offsets), np.array([nan]), 0, 0, len(times))
     veils = [veil(offsets[0])]
     count = FIRST + ROUNDS * LATER
     centre, reach, high = np.zeros(3), radius_m, height_m
@@ -132,7 +129,7 @@ def best_position(
         best = _least(veils)
         centre, reach, high = offsets[best], SMALLER * reach, SMALLER * high
     looked = int(known.sum())
-    return Found(
+    return BestPosition(
         camera, radius_m, height_m, np.array(offsets), np.array(veils), _least(veils), looked, len(times) - looked
     )
 
@@ -142,7 +139,7 @@ def _least(veils: list[float]) -> int:
 
 
 def _sunflower(count: int, radius: float, height: float) -> Floats:
-    """Spread points evenly over a disc, their heights by the golden ratio, shape (count, 3)."""
+    """Distribute points evenly over a disc, with heights by the golden ratio, shape (count, 3)."""
     k = np.arange(count) + 0.5
     golden = (np.sqrt(5.0) - 1.0) / 2.0
     r, angle = radius * np.sqrt(k / count), 2.0 * np.pi * golden * k

@@ -1,4 +1,4 @@
-"""Occurrence estimators: numbers that say how much flare a picture holds (Walch 2017, section 9.1)."""
+"""Occurrence estimators: statistics of a picture's flare (Walch 2017, section 9.1)."""
 
 from __future__ import annotations
 
@@ -6,33 +6,31 @@ from dataclasses import astuple, dataclass, fields
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Floats
 from .flare import Frame
 
-Floats = NDArray[np.float64]
-
 FLOOR = 1e-9
-"""Added before the logarithm is averaged, so that a black pixel does not make it minus infinity: what a sensor that
-holds 30 stops below the light's own irradiance could still tell from black."""
+"""Added before the logarithm so that black pixels do not give minus infinity. It is 30 stops below the light's
+irradiance, the least value that a sensor could distinguish from black."""
 
-__all__ = ["FLOOR", "Statistics", "coverage", "measure"]
+__all__ = ["FLOOR", "Statistics", "covered_area", "measure"]
 
 
 @dataclass(frozen=True)
 class Statistics:
-    """Of the flare within a frame, relative to the light's irradiance on a plane facing it.
+    """Statistics of the flare within a frame, relative to the light's irradiance on a plane facing it.
 
     Attributes
     ----------
     sum_mm2 : float
-        Flux: irradiance times area, added over the frame.
+        Flux: irradiance times area, summed over the frame.
     mean : float
-        Irradiance.
+        Mean irradiance.
     maximum, minimum : float
-        Of the pixels.
+        Extremes of the pixels.
     log_average : float
-        exp(mean(log(E + FLOOR))), the key of a picture (Reinhard et al. 2002, equation 1): what is typical of it.
+        exp(mean(log(E + FLOOR))), the key of a picture (Reinhard et al. 2002, equation 1), a typical value.
     """
 
     sum_mm2: float
@@ -43,7 +41,7 @@ class Statistics:
 
     @property
     def values(self) -> Floats:
-        """All of them in order, shape (5,)."""
+        """All statistics in order, shape (5,)."""
         return np.array(astuple(self))
 
 
@@ -51,23 +49,24 @@ NAMES = tuple(field.name for field in fields(Statistics))
 
 
 @lru_cache(maxsize=512)
-def coverage(size_px: tuple[int, int], sensor: Frame, frame: Frame, turn_deg: float) -> Floats:
-    """Compute how much of each pixel of a picture lies in a frame that is turned clockwise against it.
+def covered_area(size_px: tuple[int, int], sensor: Frame, frame: Frame, turn_deg: float) -> Floats:
+    """Compute the part of each pixel of a picture inside a frame that is rotated clockwise against it.
 
     Parameters
     ----------
     size_px : tuple of int
         Width and height of the picture.
     sensor : Frame
-        What it covers.
+        Area that the picture covers.
     frame : Frame
     turn_deg : float
-        A picture drawn at roll 0 within a frame turned by the roll shows what the upright frame sees at that roll.
+        Clockwise rotation of the frame. A picture at roll 0 in a frame rotated by the roll equals the picture at that
+        roll in the upright frame.
 
     Returns
     -------
     ndarray, shape (H, W)
-        0 to 1.
+        From 0 to 1.
     """
     width, height = size_px
     x = ((np.arange(width) + 0.5) / width - 0.5) * sensor.width
@@ -84,16 +83,16 @@ def coverage(size_px: tuple[int, int], sensor: Frame, frame: Frame, turn_deg: fl
 
 
 def measure(light: Floats, share: Floats, area: float) -> Statistics:
-    """Measure the flare in a frame.
+    """Compute the statistics of the flare in a frame.
 
     Parameters
     ----------
     light : ndarray, shape (H, W)
         Luminance of the picture.
     share : ndarray, shape (H, W)
-        From `coverage`.
+        From `covered_area`.
     area : float
-        Of the frame, mm^2.
+        Area of the frame, mm^2.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The sun's path at a place and date, and how bright it is on the way."""
+"""Position and illuminance of the sun at a place and date."""
 
 from __future__ import annotations
 
@@ -6,21 +6,20 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import FlarewrightError, optional
-from ..model.scene import Site
+from ..model.project.scene import Site
+from ..typing import Floats
 
-Floats = NDArray[np.float64]
-
-# illuminance on a plane facing the sun outside the atmosphere, lx, and the clear sky's extinction per air mass
+# illuminance on a plane facing the sun outside the atmosphere, lx, and extinction of the clear sky per air mass
 OUTSIDE_LX, CLEAR = 127500.0, 0.21
 
 __all__ = ["sun_illuminance", "sun_path"]
 
 
 def sun_path(site: Site, times: Sequence[datetime]) -> tuple[Floats, Floats]:
-    """Compute where the sun stands.
+    """Compute the position of the sun.
 
     Parameters
     ----------
@@ -31,17 +30,17 @@ def sun_path(site: Site, times: Sequence[datetime]) -> tuple[Floats, Floats]:
     Returns
     -------
     azimuth_deg, elevation_deg : ndarray, shape (T,)
-        Clockwise from north; above the horizon as it is seen, with the refraction of the air.
+        Azimuth clockwise from north; apparent elevation above the horizon, including refraction.
 
     Raises
     ------
     FlarewrightError
-        When the library for it is not installed, or does not know the date.
+        When the `astral` library is not installed, or the date is out of range.
 
     Notes
     -----
-    By `astral` (NOAA's formulas after Meeus), good to some hundredths of a degree for the years 1900 to 2100, less
-    within a degree of the horizon. Judged by published almanac values in tests/predict/test_sun.py.
+    Computed by `astral` (NOAA's formulas after Meeus), accurate to some hundredths of a degree for the years 1900 to
+    2100, less within a degree of the horizon. Compared with almanac values in tests/predict/test_sun.py.
     """
     sun = optional("astral.sun", "predict", "the sun's path")
     from astral import Observer
@@ -57,22 +56,22 @@ def sun_path(site: Site, times: Sequence[datetime]) -> tuple[Floats, Floats]:
 
 
 def sun_illuminance(elevation_deg: ArrayLike) -> Floats:
-    """Compute the illuminance that the sun of a clear sky gives on a plane facing it.
+    """Compute the illuminance by the sun in a clear sky on a plane facing it.
 
     Parameters
     ----------
     elevation_deg : array_like
-        As it is seen.
+        Apparent elevation.
 
     Returns
     -------
     ndarray
-        lx; 0 below the horizon.
+        Illuminance, lx; 0 below the horizon.
 
     Notes
     -----
     E = 127.5 klx exp(-0.21 m), the clear sky of the IES' daylight availability (RP-21), with the air mass of Kasten and
-    Young 1989, m = 1 / (sin h + 0.50572 (h + 6.07995)^-1.6364), h in degrees. The orbit's +-3 % is left out.
+    Young 1989, m = 1 / (sin h + 0.50572 (h + 6.07995)^-1.6364), h in degrees. The orbit's +-3 % are ignored.
     """
     h = np.asarray(elevation_deg, dtype=np.float64)
     above = np.maximum(h, 0.0)

@@ -1,26 +1,25 @@
-"""Which camera when: the order of shots with the least flare."""
+"""Choose the camera with the least flare over time."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from ..typing import Floats
 
-__all__ = ["Shot", "shots_of", "switching"]
+__all__ = ["Shot", "choose_cameras", "switching"]
 
 
 @dataclass(frozen=True)
 class Shot:
-    """A camera from one time on.
+    """A camera over a range of times.
 
     Attributes
     ----------
     camera : int
     first, until : int
-        Of the times: where it begins, and where the next one does.
+        Indices of the start, and of the start of the next shot.
     """
 
     camera: int
@@ -28,25 +27,25 @@ class Shot:
     until: int
 
 
-def shots_of(veil: Floats, times_s: Floats, shortest_s: float) -> tuple[Shot, ...]:
-    """Find the order of cameras with the least veil over time.
+def choose_cameras(veil: Floats, times_s: Floats, shortest_s: float) -> tuple[Shot, ...]:
+    """Compute the sequence of cameras with the least veil over time.
 
     Parameters
     ----------
     veil : ndarray, shape (C, T)
-        NaN where it is not known.
+        Veil of each camera; NaN where unknown.
     times_s : ndarray, shape (T,)
     shortest_s : float
-        No shot is shorter, rounded up to whole steps.
+        Least duration of a shot, rounded up to whole steps.
 
     Returns
     -------
     tuple of Shot
-        None for one camera or one time.
+        Empty for one camera or one time.
 
     Notes
     -----
-    What is not known counts as worse than all that is: a camera is on the air unknown only where no other order is.
+    Unknown veil counts as worse than all known: such a camera is chosen only where no other sequence exists.
     """
     if len(veil) < 2 or len(times_s) < 2:
         return ()
@@ -59,48 +58,48 @@ def shots_of(veil: Floats, times_s: Floats, shortest_s: float) -> tuple[Shot, ..
 
 
 def switching(cost: Floats, shortest: int = 1) -> tuple[Shot, ...]:
-    """Find the order of cameras with the least sum of costs, no shot shorter than asked for.
+    """Compute the sequence of cameras with the least sum of costs and a least duration of shots.
 
     Parameters
     ----------
     cost : ndarray, shape (C, T)
-        What each camera costs in each interval of time.
+        Cost of each camera in each interval of time.
     shortest : int
-        Intervals in a shot at least; one shot over all when there are fewer.
+        Least number of intervals per shot; a single shot if there are fewer.
 
     Returns
     -------
     tuple of Shot
-        Where costs are equal a camera goes on, and else the first one is taken.
+        At equal cost the current camera stays, otherwise the first one is chosen.
 
     Notes
     -----
-    Exact, by dynamic programming over where a shot ends: at time t the best order ends with a camera that has run for
-    at least `shortest`. Judged by trying all orders in tests/predict/test_planning.py.
+    Exact, by dynamic programming over the end of a shot: the best sequence up to time t ends with a shot of at least
+    `shortest`. Compared with an exhaustive search in tests/predict/test_planning.py.
     """
     cameras, count = cost.shape
     shortest = min(max(shortest, 1), count)
     sums = np.concatenate([np.zeros((cameras, 1)), np.cumsum(cost, axis=1)], axis=1)
-    # best[t]: least cost of the first t times with whole shots; going[c]: the same, camera c still running
+    # best[t]: least cost of the first t intervals, ending with a complete shot
     best = np.full(count + 1, np.inf)
     best[0] = 0.0
-    begun = np.zeros(count + 1, dtype=np.int64)
+    started = np.zeros(count + 1, dtype=np.int64)
     chosen = np.zeros(count + 1, dtype=np.int64)
-    # for each camera the least of best[s] - sums[c, s] over the starts s so far, and that start
+    # per camera: least best[s] - sums[c, s] over all starts s up to now, and that start
     least, start = np.full(cameras, np.inf), np.zeros(cameras, dtype=np.int64)
     for t in range(shortest, count + 1):
         fresh = best[t - shortest] - sums[:, t - shortest]
-        # an earlier start is kept where it costs no more: fewer cuts
+        # prefer the earlier start at equal cost: fewer cuts
         better = fresh < least - 1e-12 * np.abs(least) if np.isfinite(least).all() else np.isfinite(fresh)
         least, start = np.where(better, fresh, least), np.where(better, t - shortest, start)
         ends = least + sums[:, t]
         camera = int(np.argmin(ends))
-        best[t], begun[t], chosen[t] = ends[camera], start[camera], camera
+        best[t], started[t], chosen[t] = ends[camera], start[camera], camera
     shots: list[Shot] = []
     t = count
     while t > 0:
-        shots.insert(0, Shot(int(chosen[t]), int(begun[t]), t))
-        t = int(begun[t])
+        shots.insert(0, Shot(int(chosen[t]), int(started[t]), t))
+        t = int(started[t])
     return _joined(shots)
 
 

@@ -1,4 +1,4 @@
-"""Flares drawn once and kept: every prediction asks for the same few pictures again and again."""
+"""A table of a flare's pictures: each is drawn once and reused by all predictions."""
 
 from __future__ import annotations
 
@@ -7,22 +7,20 @@ from dataclasses import dataclass, field
 from math import floor, inf
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import FlarewrightError
+from ..typing import Floats, Pixels
 from .flare import Flare, Frame, luminance
-from .statistics import NAMES, Statistics, coverage, measure
+from .statistics import NAMES, Statistics, covered_area, measure
 
-Floats = NDArray[np.float64]
-
-# rolls drawn for each blade of an iris, and between those of a flare that does not turn, degrees
+# drawn rolls per blade of an iris, and step of drawn rolls for a flare that cannot be rotated, degrees
 PHASES, ROLL_STEP_DEG = 4, 15.0
-# angles are told apart to this many decimals of a degree
+# decimals of a degree to which angles are rounded
 DECIMALS = 4
 
-Drawn = dict[tuple[float, float], NDArray[np.float32]]
+Drawn = dict[tuple[float, float], Pixels]
 Memory = dict[str, Drawn]
-"""Luminance of what was drawn, by the flare's fingerprint, then by (constellation, roll) in degrees."""
+"""Luminance of drawn pictures, by the flare's fingerprint, then by (constellation, roll) in degrees."""
 
 __all__ = ["Drawn", "FlareTable", "Memory"]
 
@@ -34,12 +32,12 @@ class FlareTable:
     Attributes
     ----------
     flare : Flare
-        One that turns covers the frame's diagonal both ways, so that one picture serves many rolls.
+        If it can be rotated, it covers the frame's diagonal both ways, so that one picture serves many rolls.
     frame : Frame
     step_deg : float
-        Between drawn constellations in `between`.
+        Distance of drawn constellations in `between`.
     drawn : dict
-        The luminance of what was drawn, by (constellation, roll); a memory, and no part of what a table is.
+        Luminance of drawn pictures by (constellation, roll); a cache, ignored in comparisons.
     on_draw : callable or None
         Called after each new picture.
     """
@@ -60,7 +58,7 @@ class FlareTable:
             )
 
     def light(self, constellation_deg: float, roll_deg: float) -> Floats:
-        """Return the luminance of what is drawn with the light at this constellation and roll, shape (H, W)."""
+        """Return the luminance of the picture at a constellation and roll, shape (H, W); drawn once."""
         key = (round(constellation_deg, DECIMALS), round(roll_deg, DECIMALS))
         if key not in self.drawn:
             self.drawn[key] = luminance(self.flare.picture(*key)).astype(np.float32)
@@ -69,10 +67,10 @@ class FlareTable:
         return self.drawn[key].astype(np.float64)
 
     def _share(self, turn_deg: float) -> Floats:
-        return coverage(self.flare.size_px, self.flare.sensor, self.frame, round(turn_deg, 1))
+        return covered_area(self.flare.size_px, self.flare.sensor, self.frame, round(turn_deg, 1))
 
     def views(self, roll_deg: float) -> list[tuple[float, float, float]]:
-        """Return what is drawn to see the flare at a roll.
+        """Return the pictures to combine for the flare at a roll.
 
         Parameters
         ----------
@@ -81,7 +79,7 @@ class FlareTable:
         Returns
         -------
         list of (drawn_roll_deg, turn_deg, weight)
-            The roll at which it is drawn, by how much the frame turns over that picture, and weights that add up to 1.
+            Roll of the picture, rotation of the frame over it, and weight; weights sum to 1.
         """
         period = self.flare.turns_by_deg
         if period == 0.0:
@@ -96,7 +94,7 @@ class FlareTable:
         return found
 
     def nodes(self, constellation_deg: float, roll_deg: float) -> list[tuple[float, float, float, float]]:
-        """Return what is drawn around a constellation for straight lines between.
+        """Return the pictures to combine for linear interpolation at a constellation.
 
         Parameters
         ----------
@@ -105,26 +103,26 @@ class FlareTable:
         Returns
         -------
         list of (constellation_deg, drawn_roll_deg, turn_deg, weight)
-            The weights add up to 1; those of weight 0 are left out.
+            Weights sum to 1; pictures of weight 0 are left out.
         """
         across = _around(constellation_deg, self.step_deg, self.flare.least_deg, self.flare.reach_deg)
         around = self.views(roll_deg)
         return [(c, at, turn, a * b) for c, a in across if a > 1e-6 for at, turn, b in around]
 
     def at(self, constellation_deg: float, roll_deg: float = 0.0) -> Statistics:
-        """Measure the flare at exactly this constellation."""
+        """Compute the statistics at exactly this constellation."""
         return self._measured([(constellation_deg, *view) for view in self.views(roll_deg)])
 
     def between(self, constellation_deg: float, roll_deg: float) -> Statistics:
-        """Measure the flare by straight lines between the nearest drawn constellations; at most the flare's reach."""
+        """Interpolate the statistics linearly between drawn constellations, up to the flare's reach."""
         return self._measured(self.nodes(constellation_deg, roll_deg))
 
     def mean_between(self, constellation_deg: float, roll_deg: float) -> float:
-        """Return the mean of `between` alone, which takes a tenth of the time."""
+        """Return the mean of `between` only, in a tenth of the time."""
         total = 0.0
         for c, at, turn, weight in self.nodes(constellation_deg, roll_deg):
             share = self._share(turn)
-            # no dot product: its threads cost more than it does
+            # a dot product would start threads, which take longer than the sum
             total += weight * float((self.light(c, at) * share).sum()) / float(share.sum())
         return total
 
@@ -136,7 +134,7 @@ class FlareTable:
 
 
 def _around(value: float, step: float, least: float = -inf, most: float = inf) -> list[tuple[float, float]]:
-    """Return the two grid points about a value, those at the ends of the range moved onto them, with weights."""
+    """Return the two grid points around a value, limited to the range, with their weights."""
     start = floor(value / step + 1e-9) * step
     below, above = max(start, least), min(start + step, most)
     part = min(max((value - below) / (above - below), 0.0), 1.0) if above > below else 0.0

@@ -1,4 +1,4 @@
-"""Where cameras and lights are at each time, and what light reaches a camera from where."""
+"""Positions of a scene's cameras and lights over time, and the light that reaches each camera."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ProjectError
-from ..model.light import SUN_DEG
-from ..model.scene import Distant, Lamp, Scene, SceneCamera, SceneLight
-from ..optics.constellation import constellation_and_roll, view_axes
+from ..model.project.light import SUN_DEG
+from ..model.project.scene import Distant, Lamp, Scene, SceneCamera, SceneLight
+from ..optics.lens.field_angles import constellation_and_roll, view_axes
+from ..typing import Floats, Mask
 from .photometry import beam, disc_illuminance, point_illuminance
 from .sun import sun_illuminance, sun_path
 
-Floats = NDArray[np.float64]
-
-__all__ = ["CameraTrack", "Sighting", "camera_track", "moments", "moved_by", "sightings"]
+__all__ = ["CameraSighting", "CameraTrack", "camera_track", "moments", "moved_by", "sightings"]
 
 
 @dataclass(frozen=True)
@@ -30,7 +28,7 @@ class CameraTrack:
     position_m : ndarray, shape (T, 3)
     aim_m : ndarray, shape (T, 3)
     axes : ndarray, shape (T, 3, 3)
-        From `optics.constellation.view_axes`.
+        From `optics.lens.field_angles.view_axes`.
     """
 
     position_m: Floats
@@ -39,18 +37,18 @@ class CameraTrack:
 
 
 @dataclass(frozen=True)
-class Sighting:
+class CameraSighting:
     """One light seen from one camera over time.
 
     Attributes
     ----------
     constellation_deg, roll_deg : ndarray, shape (T,)
     illuminance_lx : ndarray, shape (T,)
-        On a plane at the camera that faces the light; 0 while it gives none.
+        On a plane at the camera that faces the light; 0 while the light is off.
     diameter_deg : ndarray, shape (T,)
-        Across the light.
+        Angular diameter of the light.
     distance_m : ndarray, shape (T,)
-        Infinite for the sun.
+        Infinite for distant lights.
     """
 
     constellation_deg: Floats
@@ -61,7 +59,7 @@ class Sighting:
 
 
 def moments(scene: Scene) -> tuple[Floats, tuple[datetime, ...] | None]:
-    """Return the scene's times in seconds after its start, and as dates when it tells its start.
+    """Return the scene's times in seconds after its start, and as dates if it has a start date.
 
     Parameters
     ----------
@@ -70,7 +68,7 @@ def moments(scene: Scene) -> tuple[Floats, tuple[datetime, ...] | None]:
     Returns
     -------
     times_s : ndarray, shape (T,)
-        The last one is the end, even after a shorter step.
+        Evenly spaced; the last one is the end, also after a shorter step.
     dates : tuple of datetime or None
     """
     span = scene.time
@@ -84,14 +82,14 @@ def moments(scene: Scene) -> tuple[Floats, tuple[datetime, ...] | None]:
 
 
 def camera_track(camera: SceneCamera, times_s: Floats, where: str) -> CameraTrack:
-    """Follow a camera.
+    """Compute the position and orientation of a camera over time.
 
     Parameters
     ----------
     camera : SceneCamera
     times_s : ndarray, shape (T,)
     where : str
-        For messages.
+        Name of the camera in messages.
 
     Returns
     -------
@@ -100,7 +98,7 @@ def camera_track(camera: SceneCamera, times_s: Floats, where: str) -> CameraTrac
     Raises
     ------
     ProjectError
-        When it aims at its own place, or up.
+        When it aims at its own position, or along its up direction.
     """
     position = _moving(camera.position_m, [(key.at_s, key.position_m) for key in camera.keyframes], times_s)
     aim = _moving(camera.aim_m, [(key.at_s, key.aim_m) for key in camera.keyframes], times_s)
@@ -108,7 +106,7 @@ def camera_track(camera: SceneCamera, times_s: Floats, where: str) -> CameraTrac
 
 
 def moved_by(track: CameraTrack, offset_m: Floats, camera: SceneCamera, times_s: Floats, where: str) -> CameraTrack:
-    """Move a camera by a constant offset; it aims where it did."""
+    """Shift a camera by a constant offset; its aim points are kept."""
     return _looking(track.position_m + offset_m, track.aim_m, camera, times_s, where)
 
 
@@ -126,17 +124,17 @@ def _looking(position: Floats, aim: Floats, camera: SceneCamera, times_s: Floats
 
 def sightings(
     scene: Scene, tracks: Sequence[CameraTrack], times_s: Floats, dates: Sequence[datetime] | None
-) -> list[list[Sighting]]:
-    """Follow every light from every camera.
+) -> list[list[CameraSighting]]:
+    """Compute how every camera sees every light over time.
 
     Parameters
     ----------
     scene : Scene
     tracks : sequence of CameraTrack
-        Of its cameras, or of any others.
+        Cameras of the scene, or shifted ones.
     times_s : ndarray, shape (T,)
     dates : sequence of datetime or None
-        For the sun.
+        Dates for the sun.
 
     Returns
     -------
@@ -146,7 +144,7 @@ def sightings(
     Raises
     ------
     ProjectError
-        When a light stands at a camera's place.
+        When a lamp is at a camera's position.
     """
     skies = {k: _sky(scene, light, dates) for k, light in enumerate(scene.lights) if not isinstance(light, Lamp)}
     found = []
@@ -163,7 +161,7 @@ def sightings(
 
 
 def _sky(scene: Scene, light: SceneLight, dates: Sequence[datetime] | None) -> tuple[Floats, Floats, float]:
-    """Return direction, illuminance and size of a light that is the same for all cameras."""
+    """Return direction, illuminance and angular diameter of a light that is the same for all cameras."""
     if isinstance(light, Distant):
         azimuth, elevation = np.array([light.azimuth_deg]), np.array([light.elevation_deg])
         lux, across = np.array([light.illuminance_lx]), light.diameter_deg
@@ -180,18 +178,20 @@ def _sky(scene: Scene, light: SceneLight, dates: Sequence[datetime] | None) -> t
     return np.stack([np.sin(turn) * flat, np.cos(turn) * flat, np.sin(height)], axis=-1), lux, across
 
 
-def _far(track: CameraTrack, direction: Floats, lux: Floats, across: float) -> Sighting:
+def _far(track: CameraTrack, direction: Floats, lux: Floats, across: float) -> CameraSighting:
     constellation, roll = constellation_and_roll(track.axes, direction)
     count = len(constellation)
-    return Sighting(constellation, roll, np.broadcast_to(lux, (count,)), np.full(count, across), np.full(count, np.inf))
+    return CameraSighting(
+        constellation, roll, np.broadcast_to(lux, (count,)), np.full(count, across), np.full(count, np.inf)
+    )
 
 
 def lamp_places(light: Lamp, times_s: Floats) -> Floats:
-    """Return where a lamp is over time, metres, shape (T, 3)."""
+    """Return the positions of a lamp over time, metres, shape (T, 3)."""
     return _moving(light.position_m, [(key.at_s, key.position_m) for key in light.keyframes], times_s)
 
 
-def _lamp(light: Lamp, track: CameraTrack, times_s: Floats, where: str) -> Sighting:
+def _lamp(light: Lamp, track: CameraTrack, times_s: Floats, where: str) -> CameraSighting:
     keys = light.keyframes
     position = lamp_places(light, times_s)
     away = position - track.position_m
@@ -217,11 +217,13 @@ def _lamp(light: Lamp, track: CameraTrack, times_s: Floats, where: str) -> Sight
         lux = lux * beam(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))), light.beam_deg)
     gain = _moving((1.0,), [(key.at_s, None if key.gain is None else (key.gain,)) for key in keys], times_s)[:, 0]
     diameter = 0.0 if light.diameter_m is None else light.diameter_m
-    return Sighting(constellation, roll, lux * gain, np.degrees(2.0 * np.arctan2(0.5 * diameter, distance)), distance)
+    return CameraSighting(
+        constellation, roll, lux * gain, np.degrees(2.0 * np.arctan2(0.5 * diameter, distance)), distance
+    )
 
 
 def _moving(start: Sequence[float], keys: Sequence[tuple[float, Sequence[float] | None]], times_s: Floats) -> Floats:
-    """Interpolate a place over time by straight lines, shape (T, N)."""
+    """Interpolate a position linearly over time, shape (T, N)."""
     known = [(at, np.array(place)) for at, place in keys if place is not None]
     if not known or known[0][0] > 0.0:
         known.insert(0, (0.0, np.array(start)))
@@ -229,5 +231,5 @@ def _moving(start: Sequence[float], keys: Sequence[tuple[float, Sequence[float] 
     return np.stack([np.interp(times_s, at, column) for column in places.T], axis=1)
 
 
-def _when(found: NDArray[np.bool_], times_s: Floats) -> str:
+def _when(found: Mask, times_s: Floats) -> str:
     return f" at {times_s[int(np.argmax(found))]:g} s" if len(times_s) > 1 else ""

@@ -1,24 +1,22 @@
-"""Few wavelengths that stand for all of a light's luminance: Gauss' quadrature over the eye's sensitivity."""
+"""Few wavelengths that give a light's luminance exactly: Gauss quadrature over the eye's sensitivity."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..model.light import Lines, Spectrum
-from ..optics.cie1931 import cie_1931
-from ..optics.spectrum import luminance_shares
-
-Floats = NDArray[np.float64]
+from ..model.project.light import Lines, Spectrum
+from ..optics.colour.cie1931 import cie_1931
+from ..optics.colour.spectrum import luminance_shares
+from ..typing import Floats
 
 __all__ = ["luminous_lines"]
 
 
 @lru_cache(maxsize=64)
 def luminous_lines(spectrum: Spectrum, count: int) -> Lines:
-    """Replace a spectrum by lines that give the same luminance to whatever is smooth in wavelength.
+    """Replace a spectrum by lines that give the same luminance through any factor smooth in wavelength.
 
     Parameters
     ----------
@@ -28,33 +26,33 @@ def luminous_lines(spectrum: Spectrum, count: int) -> Lines:
     Returns
     -------
     Lines
-        `count` of them, or the spectrum's own when those are no more. Luminance alone is right, colour is not.
+        `count` lines, or the spectrum's own if it has no more. Luminance is right, colour is not.
 
     Raises
     ------
     FlarewrightError
-        When the spectrum holds no visible light.
+        When the spectrum has no visible light.
 
     Notes
     -----
-    The reflectances R_j(l) R_i(l) of a ghost are smooth but far from straight between a few even wavelengths: a quarter
-    wave is darkest where the eye sees best, so that straight lines between three wavelengths make its flare brighter by
-    two thirds, between seven by a fifth. Gauss' nodes and weights for S(l) y(l) integrate polynomials up to degree
-    2 count - 1 exactly (Golub and Welsch 1969, from the measure's own recurrence).
+    The reflectances R_j(l) R_i(l) of a ghost are smooth but strongly nonlinear between a few even wavelengths: a
+    quarter-wave film reflects least where the eye is most sensitive, so that linear interpolation between three
+    wavelengths makes its flare brighter by two thirds, between seven by a fifth. Gauss nodes and weights for S(l) y(l)
+    integrate polynomials up to degree 2 count - 1 exactly (Golub and Welsch 1969, from the measure's recurrence).
     """
     wave, share = luminance_shares(spectrum)
     lit = len(np.unique(wave[share > 0.0]))
     if isinstance(spectrum, Lines) and lit <= count:
         return spectrum
-    # a narrow table has light at few nanometres, and no more nodes than these
+    # a spectrum with light at few wavelengths allows no more nodes than those
     nodes, weights = _gauss(wave, share, min(count, lit))
-    # a line's luminance is its power times y(l)
+    # the luminance of a line is its power times y(l)
     power = weights / cie_1931(nodes)[:, 1]
     return Lines(lines=tuple((float(node), float(one)) for node, one in zip(nodes, power, strict=True)))
 
 
 def _gauss(x: Floats, mass: Floats, count: int) -> tuple[Floats, Floats]:
-    """Return nodes and weights for a sum over points; the masses add up to 1."""
+    """Return Gauss nodes and weights for a sum over points; the masses sum to 1."""
     # Stieltjes: orthogonal polynomials on the points give the Jacobi matrix
     diagonal, off = np.zeros(count), np.zeros(count)
     before, now = np.zeros_like(x), np.ones_like(x)

@@ -1,4 +1,4 @@
-"""The worst moments of a plan, rendered by themselves: what they look like, and whether the prediction holds there."""
+"""Render the worst moments of a plan, to show them and to check the prediction."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Pixels, Progress
 from .contrast import washed_share
-from .curves import Progress
 from .flare import luminance
 from .plan import FlareMaker, Plan, Ranked, near_or_far
 
-# pairs of camera and light
+# largest number of pairs of camera and light
 PICTURES = 6
 
 __all__ = ["Worst", "render_worst"]
@@ -29,26 +28,26 @@ class Worst:
     picture : ndarray, shape (H, W, 3)
         The flare as luminance of the scene, cd/m^2.
     veil_cd_m2 : float
-        Its mean.
+        Mean of the picture.
     washed : float or None
-        Part of the picture where less than nine tenths of the scene's contrast are left; None: no scene.
+        Part of the picture with less than nine tenths of the scene's contrast; None without a scene.
     """
 
     ranked: Ranked
-    picture: NDArray[np.float32]
+    picture: Pixels
     veil_cd_m2: float
     washed: float | None
 
 
 def render_worst(plan: Plan, ranked: Sequence[Ranked], maker: FlareMaker, progress: Progress) -> list[Worst]:
-    """Render the worst times of the first few of a ranking.
+    """Render the worst times of the first pairs of a ranking.
 
     Parameters
     ----------
     plan : Plan
     ranked : sequence of Ranked
     maker : callable
-        (camera, light, diameter_deg, distance_m) to a flare to be looked at, over the camera's frame.
+        Maps (camera, light, diameter_deg, distance_m) to a flare for viewing, over the camera's frame.
     progress : callable
 
     Returns

@@ -1,4 +1,22 @@
-"""From a project to layers: one pass a file. The package may be called: `flarewright.render(project)` renders."""
+"""From a project to layers. The package is callable: `flarewright.render(project)` renders.
+
+Modules at this level join the sub-packages. Each sub-package holds one kind of pass, or shared helpers.
+
+Modules and sub-packages:
+
+- `render`: `render`, the only renderer; returns a `Rendering`
+- `analysis`: `paraxial` and `ghosts`, the analyses that accept any form of lens
+- `gallery`: `cards`, `card_project`, `card_picture`: pictures of the shipped lenses and looks
+- `warmup`: `compile_for_render`, `compile_for_analysis`: compile kernels ahead of time
+- `ghosts`: the ghost pass, draft and final quality
+- `starburst`: diffraction at the iris
+- `scattering`: scattered light and veiling glare
+- `reference`: Monte Carlo rendering, four-reflection ghosts, the energy ledger
+- `scene`: from a `Project` to what the passes draw: lights, iris, lens state, art rules
+- `image`: canvases, layers, gamut, exposure, display
+- `preview`: fast previews for the editor
+- `plots`: SVG and HTML figures
+"""
 
 import sys
 from inspect import Signature, signature
@@ -11,7 +29,7 @@ class _CallablePackage(ModuleType):
 
     @property
     def __signature__(self) -> Signature:
-        """Its parameters, for `inspect.signature` and what asks it."""
+        """Signature of the function, for `inspect.signature`."""
         from .render import render
 
         return signature(render)

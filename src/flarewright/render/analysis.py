@@ -1,24 +1,18 @@
-"""The analyses as a person calls them: any form of lens, every check made."""
+"""The lens analyses of the library: first-order data and the ghost table, for any form of lens, with all checks."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from ..errors import ProjectError
-from ..io.coating_text import coating_choice
+from ..io.lens.coating_text import coating_choice
 from ..model import Coating, CoatingChoice, Imperfection, Lens, Plate
-from ..optics.bundle import least_distance
-from ..optics.ghosts import GhostTable, ghost_table
-from ..optics.pack import SensorMirror, pack_lens, resolve_coatings
-from ..optics.paraxial import D_LINE_NM, FirstOrder
-from .prepare import as_lens, build, first_order
-
-if TYPE_CHECKING:
-    from .four_reflections import FourReflections
+from ..optics.lens.paraxial import D_LINE_NM, FirstOrder
+from ..optics.rays.bundle import least_distance
+from ..optics.rays.ghost_table import GhostQuery, GhostTable, ghost_table, pack_for_query
+from ..optics.rays.pack import SensorMirror
+from .scene.resolve import build, first_order, open_lens
 
 
 def paraxial(
@@ -37,7 +31,7 @@ def paraxial(
     f_number : float, optional
         None: wide open.
     sensor_distance, focus_distance : float, optional
-        Override the lens file's, mm.
+        Override the values of the lens file, mm.
 
     Returns
     -------
@@ -46,9 +40,9 @@ def paraxial(
     Raises
     ------
     FlarewrightError
-        When there is no such lens, it makes no image, or it does not open that far.
+        The lens is unknown, forms no image, or does not reach the f-number.
     """
-    known = as_lens(lens)
+    known = open_lens(lens).lens
     return first_order(known, f_number, sensor_distance=sensor_distance, focus_distance=focus_distance)
 
 
@@ -73,41 +67,33 @@ def ghosts(
     remarks: list[str] | None = None,
     threads: int | None = None,
 ) -> GhostTable:
-    """Analyse every ghost of a lens for one light (`optics.ghosts.ghost_table`).
+    """Analyse every ghost of a lens for one light.
 
     Parameters
     ----------
     lens : Lens or str or Path
         A prescription, a shipped lens' name, or a lens file.
-    field_deg : tuple of float
-        (X, Y) of the light.
+    field_deg, distance, wavelength_nm, paths, orders, order4_limit
+        As in `optics.rays.ghost_table.GhostQuery`.
     f_number : float, optional
         None: wide open.
     coating : str, path, Coating or CoatingChoice, optional
-        A text as the command line's `--coating` takes it, one coating for all surfaces between glass and air, or one a
-        row. None: as the lens file says.
-    wavelength_nm : float
-    paths : {"all", "same-side"}
+        A text as for the command line's `--coating`, one coating for all surfaces between glass and air, or one per
+        row. None: the coatings of the lens file.
     sensor_distance, focus_distance : float, optional
-        Override the lens file's, mm.
+        Override the values of the lens file, mm.
     zoom : str or float, optional
-        A position's name or a focal length, mm.
+        Name of a zoom position, or a focal length in mm.
     filter_plate, cover_glass : Plate, optional
-        Plane plates in front of the lens and of the sensor; they are rows too.
+        Plane plates in front of the lens and of the sensor; they count as rows.
     sensor_reflectance : float
-        Above 0 the sensor, unbounded here, is a mirror too, and there are paths "sensor-i".
+        Above 0 the sensor, taken as unbounded, is a mirror too, and the table has paths "sensor-i".
     imperfection : Imperfection, optional
-        One sample of the lens within tolerances.
-    orders : {2, 4}
-        4 adds ghosts of four reflections.
-    order4_limit : float
-        Of those only paths that carry more than this part of all two-reflection light on the unbounded sensor plane.
-    distance : float, optional
-        How far in front of the first vertex the light stands, mm along the axis; None: distant.
+        One sample of the lens within its tolerances.
     remarks : list of str, optional
-        What is assumed on the way, and which rows a filter and a cover glass are, is appended to it.
+        List to which assumptions and the rows of filter and cover glass are appended.
     threads : int, optional
-        None: all cores; the numbers do not depend on it.
+        None: all cores. The results do not depend on it.
 
     Returns
     -------
@@ -116,65 +102,76 @@ def ghosts(
     Raises
     ------
     FlarewrightError
-        As `paraxial`, and for a coating that does not fit the lens.
+        As in `paraxial`, and for a coating that does not fit the lens.
     """
-    known = as_lens(lens, remarks=remarks)
+    opened = open_lens(lens)
     built = build(
-        known, coating_choice(coating), zoom=zoom, filter_plate=filter_plate,
+        opened.lens, coating_choice(coating), zoom=zoom, filter_plate=filter_plate,
         cover_glass=cover_glass, imperfection=imperfection, sensor_distance=sensor_distance,
         focus_distance=focus_distance,
     )  # fmt: skip
-    if remarks is not None:
-        remarks.extend(built.remarks)
     if not 0.0 <= sensor_reflectance <= 1.0:
         raise ProjectError(f"a sensor reflects between 0 and 1 of the light, not {sensor_reflectance:g}")
-    if orders not in (2, 4) or not 0.0 < order4_limit < 1.0:
-        raise ProjectError(f"orders are 2 or 4, not {orders}, and their limit lies between 0 and 1: {order4_limit:g}")
-    # refuses an f-number that the lens does not open to
+    # raises for an f-number that the lens does not reach
     order = first_order(
         built.lens, f_number, sensor_distance=built.sensor_distance, focus_distance=built.focus_distance
     )
     sensor = SensorMirror(sensor_reflectance) if sensor_reflectance > 0.0 else None
-    found = None
-    packed = pack_lens(
-        built.lens, order, resolve_coatings(built.lens, built.coating), np.array([wavelength_nm]), sensor=sensor
-    )
-    if distance is not None and not distance > least_distance(packed):
+    query = GhostQuery(field_deg, distance, wavelength_nm, paths, sensor, orders, order4_limit)
+    table, found = find_ghosts(built.lens, order, built.coating, query, threads=threads)
+    if remarks is not None:
+        remarks += (*opened.remarks, *built.remarks, *found)
+    return table
+
+
+def find_ghosts(
+    lens: Lens, order: FirstOrder, coating: CoatingChoice, query: GhostQuery, *, threads: int | None = None
+) -> tuple[GhostTable, tuple[str, ...]]:
+    """Analyse every ghost of a lens that is built, including those of four reflections on request.
+
+    Parameters
+    ----------
+    lens : Lens
+        With its plates, zoomed (`ResolvedProject.lens`).
+    order : FirstOrder
+        At the opening and focus to be used.
+    coating : CoatingChoice
+    query : GhostQuery
+    threads : int, optional
+
+    Returns
+    -------
+    table : GhostTable
+    remarks : tuple of str
+        Four-reflection ghosts that are not listed.
+
+    Raises
+    ------
+    ProjectError
+        The light stands in the lens, or the orders or their limit are unknown.
+    """
+    if query.orders not in (2, 4) or not 0.0 < query.order4_limit < 1.0:
         raise ProjectError(
-            f"a light at {distance:g} mm stands in the lens {built.lens.name} or behind its entrance pupil; "
+            f"orders are 2 or 4, not {query.orders}, and their limit lies between 0 and 1: {query.order4_limit:g}"
+        )
+    packed = pack_for_query(lens, order, coating, query)
+    if query.distance is not None and not query.distance > least_distance(packed):
+        raise ProjectError(
+            f"a light at {query.distance:g} mm stands in the lens {lens.name} or behind its entrance pupil; "
             f"give more than {least_distance(packed):.4g} mm"
         )
-    if orders == 4:
-        from .four_reflections import find_fours_everywhere
+    if query.orders == 2:
+        return ghost_table(lens, packed, query, threads=threads), ()
+    from .reference.four_reflections import find_four_reflections_unbounded
 
-        found = find_fours_everywhere(
-            built.lens, packed, field_deg, order4_limit, distance=distance, which=paths, threads=threads
-        )
-    table = ghost_table(
-        built.lens,
-        field_deg,
-        f_number=f_number,
-        coating=built.coating,
-        wavelength_nm=wavelength_nm,
-        paths=paths,
-        sensor_distance=built.sensor_distance,
-        focus_distance=built.focus_distance,
-        sensor=sensor,
-        others=() if found is None else found.paths,
-        distance=distance,
-        threads=threads,
-    )
-    return table if found is None else _above(table, found, order4_limit, remarks)
-
-
-def _above(table: GhostTable, found: FourReflections, limit: float, remarks: list[str] | None) -> GhostTable:
-    """Leave out four-reflection rows below the limit, and tell what is missing."""
+    found = find_four_reflections_unbounded(lens, packed, query, threads=threads)
+    table = ghost_table(lens, packed, query, others=found.paths, threads=threads)
+    # remove the rows below the limit
     two = sum(row.throughput_mm2 for row in table.ghosts if not row.later_reflections)
-    rows = [row for row in table.ghosts if not row.later_reflections or row.throughput_mm2 > limit * two]
-    if remarks is not None:
-        dark, part = found.left_out({row.name for row in rows})
-        remarks.append(
-            f"ghosts of four reflections carry {found.share:.2%} of what those of two do; {dark} fainter ones with "
-            f"{part:.1%} of that are not listed"
-        )
-    return replace(table, ghosts=tuple(rows))
+    rows = [row for row in table.ghosts if not row.later_reflections or row.throughput_mm2 > query.order4_limit * two]
+    dark, part = found.left_out({row.name for row in rows})
+    remark = (
+        f"ghosts of four reflections carry {found.share:.2%} of what those of two do; {dark} fainter ones with "
+        f"{part:.1%} of that are not listed"
+    )
+    return replace(table, ghosts=tuple(rows)), (remark,)

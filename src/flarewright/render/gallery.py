@@ -1,4 +1,4 @@
-"""The library in pictures: every lens as photographed, every look on its own stage."""
+"""Pictures of the library: every lens with its photographic defaults, every look with its demonstration scene."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..io.library import shipped
-from ..io.look_file import read_look, shipped_looks
+from ..io.lens.library import library_names
+from ..io.project.look_file import read_look, shipped_looks
 from ..model import Camera, Light, Project
-from .display import layers_exposure, view
-from .looks import shown
-from .photographed import as_photographed
-from .prepare import first_order, load_lens
+from .image.display import layers_exposure, view
 from .render import render
+from .scene.looks import demonstration
+from .scene.photographic_defaults import as_photographed
+from .scene.resolve import first_order, open_lens
 
 PLACE_MM = (-7.92, 4.37)
-"""Where a light's direct image lies in the picture of a lens: up and left, so that ghosts cross the middle."""
+"""Position of the light's direct image in the picture of a lens: up and left, so that ghosts cross the centre."""
 
 Kind = Literal["lens", "look"]
 
@@ -32,11 +32,11 @@ class Card:
     ----------
     kind : {"lens", "look"}
     name : str
-        As commands take it.
+        The name that commands take.
     title, caption : str
-        What a person reads below the picture.
+        Text below the picture.
     command : str
-        What renders it.
+        The command line that renders it.
     """
 
     kind: Kind
@@ -47,12 +47,12 @@ class Card:
 
 
 def cards() -> tuple[Card, ...]:
-    """Return the pictures of the library, lenses before looks, each by name."""
-    return (*(_lens_card(name) for name in shipped()), *(_look_card(name) for name in shipped_looks()))
+    """Return the pictures of the library: lenses, then looks, each sorted by name."""
+    return (*(_lens_card(name) for name in library_names()), *(_look_card(name) for name in shipped_looks()))
 
 
 def card_project(card: Card, size_px: tuple[int, int]) -> Project:
-    """Return what a picture of the library shows.
+    """Return the project of a picture of the library.
 
     Parameters
     ----------
@@ -66,19 +66,19 @@ def card_project(card: Card, size_px: tuple[int, int]) -> Project:
     Raises
     ------
     ProjectError
-        When there is no such look.
+        There is no such look.
     """
     if card.kind == "look":
-        return shown(read_look(card.name), size_px)
-    lens = load_lens(card.name)
+        return demonstration(read_look(card.name), size_px)
+    lens = open_lens(card.name).lens
     camera = Camera(size_px=size_px, desqueeze=lens.squeeze is not None)
     lights = (Light(field_deg=light_place(card.name)),)
     return as_photographed(Project(lens=card.name, lights=lights, camera=camera))[0]
 
 
 def light_place(name: str) -> tuple[float, float]:
-    """Return the field angles, degrees, at which a lens images a light at `PLACE_MM`, to a hundredth."""
-    efl = first_order(load_lens(name)).efl
+    """Return the field angles, degrees, at which a lens images a light at `PLACE_MM`, rounded to 0.01 degree."""
+    efl = first_order(open_lens(name).lens).efl
     x, y = (round(degrees(atan(mm / efl)), 2) for mm in PLACE_MM)
     return x, y
 
@@ -94,7 +94,7 @@ def card_picture(card: Card, size_px: tuple[int, int]) -> NDArray[np.uint8]:
     Returns
     -------
     ndarray, shape (H, W, 3), uint8
-        sRGB; without rings in ghosts, which small pictures do not show.
+        sRGB. Rings in ghosts are off: they are not visible at this size.
     """
     project = card_project(card, size_px)
     drawn = render(project.replace(quality=project.quality.replace(ringing="off")))
@@ -102,7 +102,7 @@ def card_picture(card: Card, size_px: tuple[int, int]) -> NDArray[np.uint8]:
 
 
 def _lens_card(name: str) -> Card:
-    lens = load_lens(name)
+    lens = open_lens(name).lens
     x, y = light_place(name)
     wide = " --desqueeze" if lens.squeeze is not None else ""
     command = f"flarewright render {name} --light {x:g},{y:g}{wide} -o {name}.exr"

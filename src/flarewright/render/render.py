@@ -1,4 +1,4 @@
-"""From a project to layers: the one renderer that the command line, the library and everything else call."""
+"""The renderer: from a project to layers. The command line and the library both call `render`."""
 
 from __future__ import annotations
 
@@ -13,43 +13,42 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ProjectError
-from ..io.mask_image import read_mask
-from ..kernels.trace import REFRACT
+from ..io.images.mask_image import read_mask
+from ..kernels.tracing.sequential import REFRACT
 from ..model import Layer, Lens, Project, Stop
-from ..optics.grating import grating_orders
-from ..optics.paths import direct_path, ghost_paths
-from ..optics.shape import ideal
-from .art import ResolvedArt, directed, graded, resolve_art
-from .compose import beauty
-from .direct import DirectImage, direct_image, widest_defocus_mm
-from .gamut import within
-from .ghosts import plain_level, render_ghosts
-from .given import Settings, naming_settings, project_of
-from .opening import make_opening, soiled_opening
-from .placing import outside, veiled
-from .prepare import Settled, settle
-from .room import need, spare_bytes
-from .scatter import dimmed, render_scatter, scatter_facts, scatter_of
-from .shot import Shot
-from .shots import make_shots
-from .shown_layer import ShownLayer, shown_layers
-from .starburst_pass import OUT_OF_FOCUS_PX, read_soil, starburst_of
+from ..optics.lens.paths import direct_path, ghost_paths
+from ..optics.lens.surface_shape import ideal
+from ..optics.scattering.sensor_grating import grating_orders
+from ..typing import Floats, Progress
+from .ghosts.ghost_pass import plain_level, render_ghosts
+from .image.compose import beauty
+from .image.gamut import apply_gamut
+from .image.shown_layer import ShownLayer, shown_layers
+from .scattering.scatter_pass import render_scatter, scatter_facts, scatter_of, without_scattered
+from .scene.arguments import Settings, naming_settings, project_of
+from .scene.art_rules import ResolvedArt, has_overrides, resolve_art, with_gain
+from .scene.direct_image import DirectImage, direct_image, widest_defocus_mm
+from .scene.memory_check import check_memory, spare_bytes
+from .scene.opening import make_opening, soiled_opening
+from .scene.placement_remarks import outside_remarks, veil_remarks
+from .scene.resolve import ResolvedProject, resolve_project
+from .scene.shot import Shot
+from .scene.shots import make_shots
+from .starburst.starburst_pass import OUT_OF_FOCUS_PX, read_soil, starburst_of
 
 if TYPE_CHECKING:
-    from .ledger import Ledger
-    from .reference import ReferenceRun
+    from .reference.energy_ledger import Ledger
+    from .reference.estimator import ReferenceRun
 
-Progress = Callable[[float, str], None]
 
-BESIDE_PX = 1_000_000
-"""The starburst of a larger picture is not made beside its ghosts: together they hold 100 MB more at 1080p."""
+PARALLEL_PX = 1_000_000
+"""A larger picture's starburst is not computed in parallel with its ghosts: both at once need 100 MB more at 1080p."""
 PIXEL_BYTES = 12
-"""Of a layer: three float32."""
+"""Memory of a layer per pixel: three float32."""
 BLACK = "the picture is black: no light comes through the lens to the sensor"
-HIDDEN = "the picture is black: what stands in front (holdout) hides every light"
+HIDDEN = "the picture is black: the holdout hides every light"
 
 
 @dataclass(frozen=True)
@@ -60,13 +59,13 @@ class Rendering:
     ----------
     project : Project
     layers : tuple of ShownLayer
-        "beauty" first, then the passes and single ghosts that were asked for.
+        "beauty" first, then the requested passes and single ghosts.
     summary : dict
-        Facts about lens and picture, ready for JSON.
+        Facts about lens and picture, as JSON data.
     remarks : tuple of str
-        What a person should know: repairs, estimates, what was left out.
+        Sentences for the user: repairs, estimates, and light that was left out.
     ledger : Ledger or None
-        What became of the light, when asked for.
+        The energy ledger, if requested.
     """
 
     project: Project
@@ -76,8 +75,8 @@ class Rendering:
     ledger: Ledger | None = None
 
     def _repr_png_(self) -> bytes:
-        """Show the beauty in a notebook, as the PNG beside an EXR does."""
-        from .display import layers_exposure
+        """Return the beauty as PNG for notebooks, with the display of the PNG beside an EXR."""
+        from .image.display import layers_exposure
 
         return self.layers[0].png(layers_exposure(self.layers, self.project.output.colorspace))
 
@@ -97,31 +96,32 @@ def render(
     Parameters
     ----------
     project : Project, Lens, str or path
-        A project; or a prescription, a shipped lens' name or a lens file, with `lights` among the settings.
+        A project, a prescription, the name of a shipped lens, or a lens file. All but a project need the setting
+        `lights`.
     threads : int, optional
         None: all cores. The pixels do not depend on it.
     progress : callable, optional
-        Called with the finished part (0 to 1) and what was finished.
+        Called with the finished part (0 to 1) and the name of the step.
     run : ReferenceRun, optional
-        Reference quality: where to go on, where to keep the state, how long to run.
+        Reference quality: the state to resume, where to save it, and the time limit.
     ledger : bool
-        Whether to tell what became of the light; costs a second or so, nothing in reference quality.
+        Whether to compute the energy ledger. It costs about a second; in reference quality nothing.
     **settings : Settings
-        Fields of `Project` by name; they win over those of a project that is given. `coating` takes what the command
-        line's `--coating` takes too, such as "early-multicoat", "preset:staggered" or a coating file.
+        Fields of `Project` by name; they override the fields of a given project. `coating` also accepts the texts of
+        the command line's `--coating`, such as "early-multicoat", "preset:staggered" or a coating file.
 
     Returns
     -------
     Rendering
-        Layers of irradiance on the sensor, in units of the irradiance that a light of intensity 1 gives on a plane
-        facing it (docs/physics.md, "Radiometry").
+        Layers of irradiance on the sensor, in units of the irradiance from a light of intensity 1 on a plane facing it
+        (docs/physics.md, "Radiometry").
 
     Raises
     ------
     FlarewrightError
-        When the project cannot be rendered; the message says what, where, and the remedy.
+        The project cannot be rendered; the message says what, where, and the remedy.
     MemoryError
-        When its layers are more than the memory holds.
+        The layers need more memory than there is.
 
     Examples
     --------
@@ -129,14 +129,14 @@ def render(
     >>> render("canon-28-80", f_number=8, coating="early-multicoat", lights=[Light(field_deg=(10, 5))]) # doctest: +SKIP
     """
     project = project_of(project, **settings)
-    # beauty, ghosts and starburst, whatever else
-    need(prod(project.camera.size_px) * PIXEL_BYTES * (3 if project.output.starburst else 2), spare_bytes())
-    settled = settle(project)
+    # a lower bound: beauty, ghosts and starburst exist in every render
+    check_memory(prod(project.camera.size_px) * PIXEL_BYTES * (3 if project.output.starburst else 2), spare_bytes())
+    settled = resolve_project(project)
     mask = None if settled.iris.mask is None else read_mask(settled.iris.mask)
-    # rules that choose nothing are refused in every quality
-    asked = resolve_art(settled)
-    # the judge shows the physics and nothing else
-    art = ResolvedArt() if project.quality.mode == "reference" else asked
+    # rules that select no ghost are errors in every quality
+    resolved = resolve_art(settled)
+    # reference quality ignores art direction
+    art = ResolvedArt() if project.quality.mode == "reference" else resolved
     opening = make_opening(settled, mask)
     shots = seen = make_shots(settled, opening)
     tables = scatter_of(settled, shots)
@@ -145,46 +145,46 @@ def render(
         dirty = soiled_opening(opening, settled.order.stop_semi_diameter, soil)
         seen = tuple(replace(shot, opening=dirty) for shot in shots)
     if project.quality.ringing != "off" and project.quality.mode == "final":
-        from .ringing import ringing_for
+        from .ghosts.diffraction_rings import ringing_for
 
         rings = ringing_for(
             project.quality.ringing, seen[0].opening, settled.order.stop_semi_diameter, settled.order.f_number
         )
         seen = tuple(replace(shot, ringing=rings) for shot in seen)
     images = [direct_image(settled.lens, shot) for shot in shots]
-    stars = images if tables is None else dimmed(images, tables)
+    stars = images if tables is None else without_scattered(images, tables)
     starburst: Callable[[], Layer] = partial(starburst_of, settled, shots, stars, mask, soil, threads=threads)
     if project.quality.mode == "reference":
         drawn = _reference(settled, mask, run, threads, progress)
     else:
-        if project.output.starburst and prod(project.camera.size_px) <= BESIDE_PX:
-            starburst = _begun(starburst, threads)
+        if project.output.starburst and prod(project.camera.size_px) <= PARALLEL_PX:
+            starburst = _start_early(starburst, threads)
         drawn = _ghosts(settled, seen, art, threads, progress)
     passes = list(drawn.passes)
     scattered: dict[str, Any] = {}
-    told: tuple[str, ...] = ()
+    reported: tuple[str, ...] = ()
     if tables is not None:
         if project.quality.mode != "reference":
             passes.append(render_scatter(settled, shots, images, tables, threads=threads))
-        facts, told = scatter_facts(settled, tables)
+        facts, reported = scatter_facts(settled, tables)
         scattered = {"scatter": facts}
     if project.output.starburst:
         passes.insert(0, starburst())
-    # what grows beyond all numbers is refused below
+    # overflow raises an error below
     with np.errstate(over="ignore", invalid="ignore"):
-        passes = [graded(layer, art.gain.get(layer.name.removesuffix(".order4"), 1.0)) for layer in passes]
-        others = [graded(layer, art.gain.get("ghosts", 1.0)) for layer in drawn.others]
-        passes, others = within(project.output.gamut, passes), within(project.output.gamut, others)
+        passes = [with_gain(layer, art.gain.get(layer.name.removesuffix(".order4"), 1.0)) for layer in passes]
+        others = [with_gain(layer, art.gain.get("ghosts", 1.0)) for layer in drawn.others]
+        passes, others = apply_gamut(project.output.gamut, passes), apply_gamut(project.output.gamut, others)
         whole = beauty(passes, project.camera.size_px)
     layers = (whole,) if project.output.layers == "beauty" else (whole, *passes, *others)
-    # the beauty is endless where a pass is
-    refuse_endless((whole, *others))
-    # line by line: what has light shows it soon
+    # the beauty is infinite wherever a pass is
+    check_finite((whole, *others))
+    # line by line: a picture with light ends the search early
     if not any(line.any() for layer in passes for line in layer.pixels):
-        told = (*told, BLACK if any(shot.share > 0.0 for shot in shots) else HIDDEN)
+        reported = (*reported, BLACK if any(shot.share > 0.0 for shot in shots) else HIDDEN)
     account = drawn.ledger
     if ledger and account is None:
-        from .ledger import trace_ledger
+        from .reference.energy_ledger import trace_ledger
 
         account = trace_ledger(shots, project.quality.seed, scatter=tables, threads=threads)
     summary = {**_summary(settled, shots, stars, art), **drawn.facts, **scattered}
@@ -195,18 +195,18 @@ def render(
         (
             *settled.remarks,
             *drawn.remarks,
-            *told,
-            *outside(shots, images),
-            *_veiled(drawn.passes),
+            *reported,
+            *outside_remarks(shots, images),
+            *_veil_remarks(drawn.passes),
             *_remarks(settled, seen),
-            *_stretched(mask),
+            *_mask_remarks(mask),
         ),
         account if ledger else None,
     )
 
 
-def refuse_endless(layers: Sequence[Layer]) -> None:
-    """Refuse a picture whose values no file can hold.
+def check_finite(layers: Sequence[Layer]) -> None:
+    """Raise an error for layers with values that no picture file can hold.
 
     Parameters
     ----------
@@ -215,10 +215,10 @@ def refuse_endless(layers: Sequence[Layer]) -> None:
     Raises
     ------
     ProjectError
-        A value of one of them is infinite, or none.
+        A layer has an infinite value or NaN.
     """
     for layer in layers:
-        # a sum is endless where one of its parts is; that of squares is made soonest, but may be where none is
+        # any infinite value makes both sums infinite; the sum of squares is faster, but may overflow for finite values
         values = layer.pixels.ravel()
         with np.errstate(over="ignore", invalid="ignore"):
             finite = isfinite(np.vdot(values, values)) or isfinite(values.sum(dtype=np.float64))
@@ -229,23 +229,24 @@ def refuse_endless(layers: Sequence[Layer]) -> None:
             )
 
 
-def _begun(work: Callable[[], Layer], threads: int | None) -> Callable[[], Layer]:
-    """Begin some work beside what follows, where there is a second thread; return what waits for what it made.
+def _start_early(work: Callable[[], Layer], threads: int | None) -> Callable[[], Layer]:
+    """Start work in a second thread if there is one; return a function that waits for the result.
 
-    Transforms need neither the interpreter nor the compiler, for which threads that draw their first ghosts take turns.
+    The transforms of the starburst hold neither the interpreter lock nor the compiler lock, for which threads that draw
+    their first ghosts compete.
     """
     if (threads or os.cpu_count() or 1) < 2:
         return work
-    with_one = ThreadPoolExecutor(1)
-    begun = with_one.submit(work)
-    # nobody waits for it where the rest is broken off
-    with_one.shutdown(wait=False)
-    return begun.result
+    executor = ThreadPoolExecutor(1)
+    started = executor.submit(work)
+    # do not wait for it when another step raises
+    executor.shutdown(wait=False)
+    return started.result
 
 
 @dataclass(frozen=True)
 class _Drawn:
-    """The ghosts as either kind of renderer made them: light that adds, further layers, and what to tell."""
+    """The ghosts from either renderer: passes that add up, further layers, facts and remarks."""
 
     passes: tuple[Layer, ...]
     others: tuple[Layer, ...]
@@ -255,12 +256,12 @@ class _Drawn:
 
 
 def _percent(share: float) -> str:
-    """Write a part of the light for a person."""
+    """Format a part of the light as a percentage."""
     return f"{100.0 * share:.2g} %" if share >= 1e-6 else "less than 0.0001 %"
 
 
 def _ghosts(
-    settled: Settled,
+    settled: ResolvedProject,
     shots: tuple[Shot, ...],
     art: ResolvedArt,
     threads: int | None,
@@ -279,21 +280,21 @@ def _ghosts(
         "culled_share": ghosts.culled_share,
         "muted": ghosts.muted,
     }
-    told = []
+    reported = []
     if ghosts.culled:
         share = _percent(ghosts.culled_share)
-        told.append(f"{ghosts.culled} ghosts that carry {share} of the ghost light were left out")
+        reported.append(f"{ghosts.culled} ghosts that carry {share} of the ghost light were left out")
     if ghosts.faint:
         facts |= {"faint": ghosts.faint, "faint_share": ghosts.faint_share}
-        told.append(
+        reported.append(
             f"{len(project.lights)} lights: {ghosts.faint} ghosts of single lights were left out, which carry "
             f"{_percent(ghosts.faint_share)} of the ghost light"
         )
-    two = _Drawn((ghosts.total,), ghosts.singles, {"ghosts": facts}, tuple(told))
+    two = _Drawn((ghosts.total,), ghosts.singles, {"ghosts": facts}, tuple(reported))
     if project.quality.orders == 2:
         return two
     if project.quality.mode == "draft":
-        return replace(two, remarks=(*told, "draft quality has no ghosts of four reflections; final quality has"))
+        return replace(two, remarks=(*reported, "draft quality has no ghosts of four reflections; final quality has"))
     plain = plain_level(shots, paths, threads) if art.paths else ghosts.level
     four = _fours(settled, shots, (plain, ghosts.level), singles, threads, progress)
     return _Drawn(
@@ -302,19 +303,19 @@ def _ghosts(
 
 
 def _fours(
-    settled: Settled,
+    settled: ResolvedProject,
     shots: tuple[Shot, ...],
     levels: tuple[float, float],
     singles: int | None,
     threads: int | None,
     progress: Progress | None,
 ) -> _Drawn:
-    """Draw the ghosts of four reflections worth it beside those of two, whose levels stand without and with art."""
-    from .four_reflections import find_fours
+    """Draw the four-reflection ghosts above the limit; `levels` of two-reflection ghosts without and with art."""
+    from .reference.four_reflections import find_four_reflections
 
     quality = settled.project.quality
     limit = quality.order4_limit
-    found = find_fours(settled.lens, shots, limit, quality.seed, which=quality.paths, threads=threads)
+    found = find_four_reflections(settled.lens, shots, limit, quality.seed, which=quality.paths, threads=threads)
     art = resolve_art(settled, found.paths)
     ghosts = render_ghosts(
         shots, found.paths, quality.replace(cull=0.0), singles=singles, art=art.paths, level=levels[1],
@@ -329,65 +330,67 @@ def _fours(
         "left_out_share": part,
         "share_of_two_reflections": found.share,
     }
-    told = [
+    reported = [
         f"{ghosts.drawn} ghosts of four reflections were drawn; {dark} fainter ones were left out, which carry "
         f"{part:.1%} of that light, {part * found.share:.2%} of the two-reflection light"
     ]
     if found.short:
-        told.append(f"--order4-limit {limit:g} is so low that some ghosts above it may have been missed")
-    return _Drawn((replace(ghosts.total, name="ghosts.order4"),), ghosts.singles, {"ghosts.order4": facts}, tuple(told))
+        reported.append(f"--order4-limit {limit:g} is so low that some ghosts above it may have been missed")
+    return _Drawn(
+        (replace(ghosts.total, name="ghosts.order4"),), ghosts.singles, {"ghosts.order4": facts}, tuple(reported)
+    )
 
 
 def _reference(
-    settled: Settled,
-    mask: NDArray[np.float64] | None,
+    settled: ResolvedProject,
+    mask: Floats | None,
     run: ReferenceRun | None,
     threads: int | None,
     progress: Progress | None,
 ) -> _Drawn:
-    from .reference import ReferenceRun, render_reference
+    from .reference.estimator import ReferenceRun, render_reference
 
     found = render_reference(settled, mask, run or ReferenceRun(), threads=threads, progress=progress)
-    told = list(found.remarks)
+    reported = list(found.remarks)
     if settled.project.output.layers == "ghosts":
-        told.append("reference quality has no layer for each ghost; final quality has")
-    if directed(settled.project):
-        told.append("reference quality shows the physics: art direction and offsets by chance are left out")
+        reported.append("reference quality has no layer for each ghost; final quality has")
+    if has_overrides(settled.project):
+        reported.append("reference quality shows the physics: art direction and offsets by chance are left out")
     if settled.project.quality.paths != "all":
-        told.append(f"reference quality traces every path, not only {settled.project.quality.paths} ones")
-    return _Drawn(found.layers, found.variances, {"reference": found.facts}, tuple(told), found.ledger)
+        reported.append(f"reference quality traces every path, not only {settled.project.quality.paths} ones")
+    return _Drawn(found.layers, found.variances, {"reference": found.facts}, tuple(reported), found.ledger)
 
 
-def _veiled(passes: Sequence[Layer]) -> list[str]:
+def _veil_remarks(passes: Sequence[Layer]) -> list[str]:
     ghosts = next((layer for layer in passes if layer.name == "ghosts"), None)
-    return [] if ghosts is None else veiled(ghosts)
+    return [] if ghosts is None else veil_remarks(ghosts)
 
 
-def _remarks(settled: Settled, shots: tuple[Shot, ...]) -> tuple[str, ...]:
-    told = []
+def _remarks(settled: ResolvedProject, shots: tuple[Shot, ...]) -> tuple[str, ...]:
+    reported = []
     blur_px = widest_defocus_mm(settled.lens, shots) * float(shots[0].to_pixels[2])
     if settled.project.output.starburst and blur_px > OUT_OF_FOCUS_PX:
         of = f"the direct image of {'the light' if len(shots) == 1 else 'a light'} is out of focus"
         spot = "a disc" if shots[0].packed.curvature_x is None else "a spot up to"
-        told.append(f"{of}: {spot} {blur_px:.1f} pixels wide")
+        reported.append(f"{of}: {spot} {blur_px:.1f} pixels wide")
     if settled.project.quality.mode == "draft" and ideal(settled.lens) != settled.lens:
-        told.append("draft quality draws the lens as designed, without decentre, tilt and figure errors")
+        reported.append("draft quality draws the lens as designed, without decentre, tilt and figure errors")
     quality = settled.project.quality
-    told += _grating_remarks(settled, shots)
+    reported += _grating_remarks(settled, shots)
     if quality.ringing == "frft" and quality.mode != "final":
-        told.append(f"{quality.mode} quality traces rays alone: quality.ringing is for final quality")
+        reported.append(f"{quality.mode} quality traces rays alone: quality.ringing is for final quality")
     rings = shots[0].ringing
     if rings is not None:
-        # only here: what has no rings need not know of them
-        from .edge_rings import untabled
+        # imported only where there are rings
+        from .ghosts.ring_tables import table_obstacle
 
-        if own := untabled(settled.lens, settled.project.lights, image=rings.form is None):
-            told.append(f"rings in the ghosts of {own} take most of the time: --ringing off leaves them out")
-    return tuple(told)
+        if own := table_obstacle(settled.project.lights, image=rings.form is None):
+            reported.append(f"rings in the ghosts of {own} take most of the time: --ringing off leaves them out")
+    return tuple(reported)
 
 
-def _grating_remarks(settled: Settled, shots: tuple[Shot, ...]) -> list[str]:
-    """Tell what of a sensor's grating cannot be seen, or is left out."""
+def _grating_remarks(settled: ResolvedProject, shots: tuple[Shot, ...]) -> list[str]:
+    """Return remarks about orders of a sensor grating that are invisible or left out."""
     camera, mode = settled.project.camera, settled.project.quality.mode
     if camera.sensor_grating is None:
         return []
@@ -401,35 +404,37 @@ def _grating_remarks(settled: Settled, shots: tuple[Shot, ...]) -> list[str]:
     return [f"{len(orders)} orders of the sensor's grating were drawn, which hold {drawn:.1%} of what it reflects"]
 
 
-def _stretched(mask: NDArray[np.float64] | None) -> list[str]:
-    """Tell of an image of the iris that is not square: it stands for the square around the round opening."""
+def _mask_remarks(mask: Floats | None) -> list[str]:
+    """Return a remark about a mask that is not square: it is mapped to the square around the round opening."""
     if mask is None or mask.shape[0] == mask.shape[1]:
         return []
     height, width = mask.shape
     return [f"the iris image has {width}x{height} pixels and is stretched to the square around the iris; give a square"]
 
 
-def _scene_scale(settled: Settled, shot: Shot) -> float:
-    """Irradiance on the sensor's middle per radiance of an extended scene: pi T (r / d)^2 of the exit pupil.
+def _scene_scale(settled: ResolvedProject, shot: Shot) -> float:
+    """Irradiance at the sensor's centre per radiance of an extended scene: pi T (r / d)^2 of the exit pupil.
 
-    Layers divided by it are in the unit of the plate (docs/physics.md, "Radiometry"). In focus at infinity r / d is
-    1 / (2 N), and it shrinks as the sensor moves away for a near plane.
+    Dividing layers by it gives the unit of the plate (docs/physics.md, "Radiometry"). Focused at infinity, r / d is
+    1 / (2 N); it shrinks as the sensor moves away for a near focus plane.
     """
     order = settled.order
     packed = shot.packed
-    # along the axis every surface is met at right angles, which ends its table
+    # rays along the axis meet every surface at normal incidence, the last entry of its table
     path, middle = direct_path(settled.lens), (len(packed.wavelengths_nm) - 1) // 2
     passed = 1.0 - packed.reflectance[middle, path.rows[path.actions == REFRACT], -1]
     sensor_z = packed.sensor_z
     slope = 0.5 / order.f_number
     if isfinite(order.exit_pupil_z):
         slope = 0.5 * order.exit_pupil_diameter / abs(sensor_z - order.exit_pupil_z)
-    # a mask spans a square, of which the round opening is pi / 4
+    # a mask spans a square; the round opening is pi / 4 of it
     opened = shot.opening.mean_transmittance * (1.0 if shot.opening.mask is None else 4.0 / pi)
     return float(pi * passed.prod() * opened * slope**2)
 
 
-def _summary(settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage], art: ResolvedArt) -> dict[str, Any]:
+def _summary(
+    settled: ResolvedProject, shots: tuple[Shot, ...], images: list[DirectImage], art: ResolvedArt
+) -> dict[str, Any]:
     order, project = settled.order, settled.project
     return {
         "lens": settled.lens.name,
@@ -453,7 +458,7 @@ def _summary(settled: Settled, shots: tuple[Shot, ...], images: list[DirectImage
 
 
 def _light_summary(project: Project, number: int, parts: list[tuple[Shot, DirectImage]]) -> dict[str, Any]:
-    """Tell where a light is imaged and how bright; of an area light the mean over its parts."""
+    """Return image position and brightness of a light; for an area light the mean over its parts."""
     light = project.lights[number]
     hidden = project.holdout is not None or light.holdout is not None
     throughput = np.sum([shot.share * image.throughput_mm2 for shot, image in parts], axis=0)
@@ -472,4 +477,4 @@ def _light_summary(project: Project, number: int, parts: list[tuple[Shot, Direct
     }
 
 
-__all__ = ["Rendering", "refuse_endless", "render"]
+__all__ = ["Rendering", "check_finite", "render"]

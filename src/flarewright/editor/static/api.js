@@ -1,5 +1,7 @@
-// Asking the server, and telling a person what went wrong in its words.
+// Requests to the server, and toasts with its error messages. Addresses are relative: a proxy may put a path before them.
 import { hush, toast } from './ui.js';
+
+export const socketAddress = (path) => new URL(path, document.baseURI).href.replace(/^http/, 'ws');
 
 export async function get(path) {
   const answer = await fetch(path);
@@ -9,7 +11,7 @@ export async function get(path) {
   return data;
 }
 
-// How many changes are on their way to the server.
+// Number of changes on their way to the server.
 export const under = { way: 0 };
 
 export async function post(path, body) {
@@ -25,6 +27,7 @@ async function send(path, body) {
     body: raw ? body : JSON.stringify(body ?? {}),
   });
   hush('lost');
+  if (answer.status === 413) throw new Error('This file is larger than the editor reads, 256 MB.');
   const data = await answer.json();
   if (!answer.ok) throw new Error(data.error || answer.statusText);
   return data;
@@ -32,7 +35,7 @@ async function send(path, body) {
 
 export const sentence = (text) => {
   const plain = String(text).trim();
-  // a file keeps its name as it is, and so does a field
+  // do not capitalise the name of a file or a field
   const name = /^\S+[._]\w+\b/.test(plain) || /^(?!cannot )[^:]+\.\w{2,5}: /.test(plain);
   return (name ? plain.charAt(0) : plain.charAt(0).toUpperCase()) + plain.slice(1) + (/[.!?]$/.test(plain) ? '' : '.');
 };
@@ -41,11 +44,11 @@ export function inWords(error) {
   return isLost(error) ? LOST : sentence(error.message);
 }
 const isLost = (error) => error instanceof TypeError && /fetch/i.test(error.message);
-// for as long as it is so, and once
-export const LOST = 'The editor does not answer. Everything up to here is saved; start flarewright edit again.';
+// shown once, until the connection is back
+export const LOST = 'The editor does not answer. All changes so far are saved; start flarewright edit again.';
 export const complain = (error, about = '') => (isLost(error) ? toast(LOST, 'error', Infinity, 'lost') : toast(inWords(error), 'error', 9000, about));
 
-// Only the newest call counts: while one is under way, the last of the others waits. What is returned waits for all.
+// Run one call at a time: while it runs, only the newest later call waits. The returned promise waits for all.
 export function latest(work) {
   let running = null;
   let next = null;
@@ -64,8 +67,8 @@ export function latest(work) {
   };
 }
 
-// One after another, in the order in which they were asked for: what is saved or undone right behind a number is saved or
-// undone with it. Of those of one stroke that wait next to each other only the newest is done, for all of them.
+// A queue: calls run one after another in the order of the requests, so that a save right after an edit includes it.
+// Of adjacent waiting calls of one stroke only the newest runs, for all of them.
 export function inLine() {
   const waiting = [];
   let running = false;

@@ -1,5 +1,5 @@
-// The page: one state from the server, drawn by panels; every change is a deed that the server does or refuses.
-import { LOST, complain, get, inLine, inWords, latest, post, sentence, under } from './api.js';
+// The page: one state from the server, shown by panels; every change is a command that the server runs or rejects.
+import { LOST, complain, get, inLine, inWords, latest, post, sentence, socketAddress, under } from './api.js';
 import { fitted } from './section.js';
 import { button, dialog, forget, h, hush, menu, stroke, tips, toast, slider } from './ui.js';
 import { viewport } from './viewport.js';
@@ -13,51 +13,53 @@ import { panelOfLens } from './of_lens.js';
 import { player } from './player.js';
 import { targetPanel } from './panel_target.js';
 
-const app = { state: null, light: 0, ghost: null, wish: null, ghosts: { fresh: false, ghosts: [] }, tab: 'light', row: null };
+// the cookie has the token from now on; keep it out of the history
+history.replaceState(null, '', location.pathname);
+const app = { state: null, light: 0, ghost: null, ghostTarget: null, ghosts: { fresh: false, ghosts: [] }, tab: 'light', row: null };
 window.flarewright = app;
 app.player = player(app);
 app.under = under;
 const $ = (id) => document.getElementById(id);
 
 // ------------------------------------------------------------------------------------------------------------- state
-// What is drawn depends on, as it was told last: hands write into the state before it is told.
+// Keys of the parts of the last server state on which pictures depend; drags write into the page's state earlier.
 const ghostsOf = (s) => JSON.stringify([s.lens.name, s.lens.rows.map((row) => row.stop)]);
 const placesOf = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.view.grey, s.view.unclipped]);
-// what the target is shown with, as the picture is
+// display settings of the target picture, shared with the picture
 const seenOf = (s) => JSON.stringify([s.view.look, s.view.stops, s.view.plate, s.view.plate_stops, s.view.grey, s.view.unclipped]);
 const shotOf = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.dirt, s.coating, s.pass_gain, s.by_hand, s.view.grey, s.view.unclipped]);
 let known = {};
-// as the server told it: hands write into the page's own
+// the server's state, without the page's pending changes
 let plain = null;
 let plainGhosts = null;
 function take(state) {
   if (app.state && state.revision < app.state.revision) return;
   const old = app.state;
-  // what is told of the picture on its own may come before an answer that is older
+  // a picture event may arrive before an older answer
   if (old && old.picture.number > state.picture.number) state.picture = old.picture;
   plain = structuredClone(state);
   Object.assign(state.view, asked);
   app.state = state;
   app.light = Math.min(app.light, state.lights.length - 1);
-  // a hand holds nothing any more where another tab took its light away
+  // end a drag whose light another tab has removed
   if (app.view.drag?.light >= state.lights.length) { app.view.drag = null; app.view.letGo(); }
   const before = known;
   known = { ghosts: ghostsOf(state), places: placesOf(state), shot: shotOf(state), design: JSON.stringify(state.design), seen: seenOf(state) };
-  // another lens has other ghosts, and so has one whose rows have other numbers
+  // another lens, or other row numbers, make other ghosts
   if (old && before.ghosts !== known.ghosts) {
-    Object.assign(app, { ghost: null, wish: null, ghosts: { fresh: false, ghosts: [] } });
+    Object.assign(app, { ghost: null, ghostTarget: null, ghosts: { fresh: false, ghosts: [] } });
     plainGhosts = null;
     app.hint();
   }
-  // nor is there a new ghost any more whose wish was undone
-  if (app.wish !== null && state.design?.wishes[app.wish]?.ghost !== null) app.wish = null;
+  // the target of a new ghost may be undone
+  if (app.ghostTarget !== null && state.design?.ghost_targets[app.ghostTarget]?.ghost !== null) app.ghostTarget = null;
   if (before.places !== known.places) app.view.forget();
-  // the path of another project begins anew
+  // reset the player for another project
   if (old && old.opened !== state.opened) app.player.reset();
   const moved = !old || before.shot !== known.shot;
   if (moved) {
     app.view.outline = null;
-    // where a hand waits for its picture, that comes first
+    // after a drag the picture has priority
     if (app.view.released) app.view.afterwards = drawSection; else drawSection();
   }
   if (moved || before.design !== known.design) app.places();
@@ -66,7 +68,7 @@ function take(state) {
   if (state.picture.number !== app.view.shownNumber) app.view.refresh(Boolean(old));
 }
 app.take = take;
-// What was refused, or never reached the server, stands nowhere on the page any more.
+// Restore the server's state: drop changes that were rejected or lost.
 app.back = () => {
   if (!plain) return;
   const { picture, solve } = app.state ?? plain;
@@ -75,7 +77,7 @@ app.back = () => {
   if (plainGhosts) app.ghosts = structuredClone(plainGhosts);
   update();
 };
-export const reload = latest(async () => take(await get('/api/state')));
+export const reload = latest(async () => take(await get('api/state')));
 
 function update() {
   const state = app.state;
@@ -89,38 +91,38 @@ function update() {
 }
 app.refreshPanel = () => {
   panels[app.tab].update?.(app.state);
-  // a hand may hold its light elsewhere than the project does
+  // during a drag, show the angles of the drag
   const { live, lights } = app.view.mover;
   if (live && lights) writeLights(lights);
 };
 const fileName = (state) => (state.file ? state.file.split(/[\\/]/).pop() : state.lens.name);
 
-// What changes the project goes one after another, so that the last word of a hand is the last, and what is saved, undone or
-// searched for is what the page shows.
+// All changes of the project go through one queue, so that the last change wins, and save, undo and search use what
+// the page shows.
 const line = inLine();
 app.line = line;
-app.deed = async (name, values, group = '', table = null, stroke = '') => {
-  const about = `deed ${name}`;
+app.command = async (name, values, group = '', table = null, stroke = '') => {
+  const about = `command ${name}`;
   try {
     await line(async () => {
-      const state = await post('/api/do', { name, values, group, table: typeof table === 'function' ? table() : table });
+      const state = await post('api/do', { name, values, group, table: typeof table === 'function' ? table() : table });
       hush(about);
       take(state);
       if (state.became) toast(sentence(state.became), 'info', 9000, about);
     }, stroke);
   } catch (error) { complain(error, about); app.back(); reload(); loadGhosts(); throw error; }
 };
-// the rows that the page shows: a deed on one of them is none on a row of another lens
+// identifies the shown rows: a command on one of them must not apply to another lens
 app.table = () => app.state.lens.table;
-// A slider may ask faster than the server answers: only its newest value is sent.
-app.lively = (name, values, group, table = null) => app.deed(name, values, group, table, group).catch(() => {});
-// Keys come faster than answers: the page knows at once what was asked for, and nothing that was asked is dropped.
+// For sliders, which change faster than the server answers: only the newest value is sent.
+app.lively = (name, values, group, table = null) => app.command(name, values, group, table, group).catch(() => {});
+// Keys repeat faster than answers: the page applies values at once, and sends all of them.
 let asked = {};
 const sendView = latest(async () => {
   const values = asked;
   asked = {};
   if (!Object.keys(values).length) return;
-  try { take(await post('/api/view', values)); hush('view'); } catch (error) { complain(error, 'view'); app.back(); reload(); }
+  try { take(await post('api/view', values)); hush('view'); } catch (error) { complain(error, 'view'); app.back(); reload(); }
 });
 app.setView = (values) => {
   Object.assign(asked, values);
@@ -138,9 +140,9 @@ app.ask = async (path, body) => {
     });
   } catch (error) { complain(error, path); return null; }
 };
-// A search is ended at once, whatever waits.
-app.stopSolving = async () => { try { take(await post('/api/stop')); } catch (error) { complain(error); } };
-// What plays is not kept where it stops: that would be a step of the history, and nothing could be done again.
+// Bypasses the queue, to end a search at once.
+app.stopSolving = async () => { try { take(await post('api/stop')); } catch (error) { complain(error); } };
+// Undo or redo during playback does not store the stopped position: a new step would clear the redo list.
 app.step = async (path) => {
   const played = app.player.playing;
   app.player.halt();
@@ -151,15 +153,15 @@ app.step = async (path) => {
 // ------------------------------------------------------------------------------------------------------------- ghosts
 app.choose = (name, walking = false) => {
   app.ghost = name;
-  app.wish = null;
+  app.ghostTarget = null;
   if (!walking && !name) { app.view.stack = []; app.view.spot = null; }
   app.view.refreshOutline();
   drawSection();
   app.refreshPanel();
   app.hint();
 };
-app.chooseWish = (number) => {
-  Object.assign(app, { wish: number, ghost: null });
+app.chooseGhostTarget = (number) => {
+  Object.assign(app, { ghostTarget: number, ghost: null });
   app.view.outline = null;
   app.view.forget();
   drawSection();
@@ -171,7 +173,7 @@ app.chooseLight = (k) => { if (app.light !== k) { app.light = k; app.refreshPane
 function writeLights(lights) {
   if (app.tab === 'light') panels.light.moved?.(lights[app.light]);
 }
-// writing numbers costs a layout of the panel: some ten times a second is enough for the eye
+// writing numbers costs a layout of the panel: ten times a second is enough
 let wrote = 0;
 app.lightsMoved = (lights) => {
   const now = performance.now();
@@ -181,17 +183,17 @@ app.lightsMoved = (lights) => {
 };
 app.hint = () => {
   const { stack, at } = app.view;
-  const place = stack.length > 1 && stack[at] === app.ghost ? ` – ${at + 1} of ${stack.length} here, scroll to walk through them` : '';
+  const place = stack.length > 1 && stack[at] === app.ghost ? ` – ${at + 1} of ${stack.length} here, scroll to step through them` : '';
   $('hint').textContent = app.ghost ? `Ghost ${app.ghost}${place}` : '';
 };
 app.places = latest(async () => {
   if (app.tab !== 'target' || app.state?.lens.measured) return;
-  try { app.view.places = (await get('/api/places')).places; } catch { app.view.places = []; }
+  try { app.view.places = (await get('api/places')).places; } catch { app.view.places = []; }
   panels.target.update?.(app.state);
   app.view.redraw();
 });
 const loadGhosts = latest(async () => {
-  app.ghosts = await get('/api/ghosts');
+  app.ghosts = await get('api/ghosts');
   plainGhosts = structuredClone(app.ghosts);
   if (!app.state) return;
   app.refreshPanel();
@@ -201,21 +203,21 @@ const loadGhosts = latest(async () => {
 // ------------------------------------------------------------------------------------------------------ cross-section
 let shut = localStorage.getItem('section') === 'shut';
 const drawing = h('div', { class: 'drawing' });
-const told = h('span');
+const reported = h('span');
 const fold = button('', () => { shut = !shut; localStorage.setItem('section', shut ? 'shut' : 'open'); folded(); drawSection(); }, { kind: 'quiet', tip: 'Show or hide the cross-section (X).' });
 function folded() { const none = Boolean(app.state?.lens.measured); $('section').classList.toggle('shut', shut || none); fold.hidden = none; fold.textContent = shut ? 'show section' : 'hide'; app.view.redraw(); }
 const drawSection = latest(async () => {
   if (!app.state) return;
   folded();
-  if (shut || app.state.lens.measured) { told.replaceChildren(...facts(app.state)); return; }
+  if (shut || app.state.lens.measured) { reported.replaceChildren(...facts(app.state)); return; }
   const { ghost } = app;
-  const answer = await fetch(`/api/section${ghost ? `?ghost=${encodeURIComponent(ghost)}` : ''}`);
-  // a lens that makes no image keeps the drawing of before
-  if (!answer.ok) { told.replaceChildren(...facts(app.state)); return; }
+  const answer = await fetch(`api/section${ghost ? `?ghost=${encodeURIComponent(ghost)}` : ''}`);
+  // for a lens without an image keep the previous drawing
+  if (!answer.ok) { reported.replaceChildren(...facts(app.state)); return; }
   const found = await answer.json();
   drawing.innerHTML = found.svg;
   if (found.svg) fitted(drawing.firstElementChild, drawing.clientWidth - 20, drawing.clientHeight - 4);
-  told.replaceChildren(...facts(app.state), ...(ghost ? [h('span', {}, found.told ? 'ghost ' : 'rays of ghost ', h('b', {}, ghost), found.told ? `: ${found.told}` : '')] : []));
+  reported.replaceChildren(...facts(app.state), ...(ghost ? [h('span', {}, found.reported ? 'ghost ' : 'rays of ghost ', h('b', {}, ghost), found.reported ? `: ${found.reported}` : '')] : []));
 });
 function facts(state) {
   const { facts: f, name } = state.lens;
@@ -226,21 +228,21 @@ function facts(state) {
 // ------------------------------------------------------------------------------------------------------------- header
 function header() {
   const file = h('span', { class: 'file' });
-  const undo = button('↶', () => app.step('/api/undo'), { kind: 'quiet', 'aria-label': 'Undo', id: 'undo' });
-  const redo = button('↷', () => app.step('/api/redo'), { kind: 'quiet', 'aria-label': 'Redo', id: 'redo' });
-  const look = h('select', { id: 'look', 'aria-label': 'View', tip: 'How linear light becomes a picture for the screen; files stay linear.' },
+  const undo = button('↶', () => app.step('api/undo'), { kind: 'quiet', 'aria-label': 'Undo', id: 'undo' });
+  const redo = button('↷', () => app.step('api/redo'), { kind: 'quiet', 'aria-label': 'Redo', id: 'redo' });
+  const look = h('select', { id: 'look', 'aria-label': 'View', tip: 'Conversion of linear light to a picture for the screen; files stay linear.' },
     h('option', { value: 'filmic' }, 'Filmic'), h('option', { value: 'srgb' }, 'sRGB'), h('option', { value: 'aces' }, 'ACES'), h('option', { value: 'false-colour' }, 'False colour'));
   look.addEventListener('change', () => app.setView({ look: look.value }));
   const exposure = slider({
-    label: 'Exposure', tip: 'Stops: each step of one doubles the light. It changes the screen, no file.', min: -6, max: 30, step: 0.1, digits: 1, name: 'exposure',
+    label: 'Exposure', tip: 'In stops: each stop doubles the light. Changes the screen only, no file.', min: -6, max: 30, step: 0.1, digits: 1, name: 'exposure',
     get: (s) => s.view.stops, set: (value) => app.setView({ exposure_stops: value }),
   });
-  const auto = button('Auto', () => app.ask('/api/expose'), { tip: 'Find the exposure that shows the ghosts (A). It stays while the light moves, so brightness can be compared.' });
+  const auto = button('Auto', () => app.ask('api/expose'), { tip: 'Set the exposure so that ghosts are visible (A). It is constant while the light moves, so brightness can be compared.' });
   const exposed = exposure.element;
   exposed.className = 'exposure';
   $('bar').append(
     h('span', { class: 'brand' }, 'Flarewright'),
-    button('Open', openFile, { tip: 'Open a project, a lens file, a measured flare, or a lens by its name (O).', id: 'open' }),
+    button('Open', openFile, { tip: 'Open a project, a lens file, a measured flare, or a lens by name (O).', id: 'open' }),
     button('Save', () => save(), { tip: 'Save the project file (Ctrl+S).', id: 'save' }),
     button('Export ▾', (event) => menu(event.currentTarget, exports), { id: 'export', tip: 'The project under another name, pictures, lens, table of ghosts, or the command that renders the saved project.' }),
     file, h('span', { class: 'split' }), undo, redo, h('span', { class: 'gap' }), exposed, auto, look,
@@ -262,7 +264,7 @@ function header() {
   };
 }
 const exports = [
-  ['Save as…', saveAs, 'Save the project under another name, and go on with that file (Ctrl+Shift+S).'],
+  ['Save as…', saveAs, 'Save the project under another name, which becomes its file (Ctrl+Shift+S).'],
   ['EXR with layers', () => download('exr'), 'Rendered at the size and quality of the project; takes as long as a render. Values are irradiances times its attribute flarewright.scale.'],
   ['PNG as shown', () => download('png')],
   ['Lens file', () => download('lens')],
@@ -274,9 +276,9 @@ const exports = [
 async function download(kind) {
   if (kind === 'exr') toast('Rendering the EXR…');
   try {
-    // of what the page shows, not of what has not reached the editor yet
+    // wait for pending changes, to export what the page shows
     await line(() => {});
-    const answer = await fetch(`/api/export/${kind}`);
+    const answer = await fetch(`api/export/${kind}`);
     if (!answer.ok) throw new Error((await answer.json()).error);
     const name = /filename="([^"]+)"/.exec(answer.headers.get('Content-Disposition'))?.[1] ?? `flare.${kind}`;
     const link = h('a', { href: URL.createObjectURL(await answer.blob()), download: name });
@@ -288,19 +290,19 @@ async function download(kind) {
 }
 async function copyCommand() {
   try {
-    const { text } = await line(() => get('/api/command'));
+    const { text } = await line(() => get('api/command'));
     try {
       await navigator.clipboard.writeText(text);
       toast(`Copied: ${text}`, 'good', 9000);
     } catch {
-      // browsers keep the clipboard from pages of other machines
+      // browsers block the clipboard on pages of other computers
       const box = h('textarea', { readonly: true, rows: 3, name: 'command', 'aria-label': 'Command line' }, text);
       dialog('Command line', h('p', { class: 'quietly' }, 'It renders the saved project. Copy it with Ctrl+C.'), box);
       box.select();
     }
   } catch (error) { complain(error); }
 }
-// A file's name: what is refused is said beside it, so that it can be mended, or asked for once more.
+// A dialog for a file name; an error appears in it, so that the name can be corrected.
 function asking(title, words, value, path, done = () => {}) {
   const box = h('input', { type: 'text', value, style: 'width:420px', name: 'path', spellcheck: 'false' });
   const wrong = h('p', { class: 'wrong', role: 'alert' });
@@ -322,13 +324,13 @@ function asking(title, words, value, path, done = () => {}) {
   });
   box.focus(); box.select();
 }
-const saved = (state) => toast(state.told, 'good', 4500, '/api/save');
-function openFile() { asking('Open', 'A project file, a lens file, a measured flare, or a lens’ name. Files can also be dropped on the page.', '', '/api/open'); }
-function saveAs() { asking('Save', 'Where the project file shall lie, like shot.toml.', app.state.file ?? 'flare.toml', '/api/save', saved); }
+const saved = (state) => toast(state.reported, 'good', 4500, 'api/save');
+function openFile() { asking('Open', 'A project file, a lens file, a measured flare, or a lens’ name. Files can also be dropped on the page.', '', 'api/open'); }
+function saveAs() { asking('Save', 'Path of the project file, like shot.toml.', app.state.file ?? 'flare.toml', 'api/save', saved); }
 async function save() {
   const text = app.state.file;
   if (!text) { saveAs(); return; }
-  const state = await app.ask('/api/save', { text });
+  const state = await app.ask('api/save', { text });
   if (state) saved(state);
 }
 
@@ -346,15 +348,15 @@ function working(words, part) {
 }
 app.status = status;
 const GRADES = { moving: 'moving, by matrices', draft: 'draft, by matrices', soon: 'final for the screen, by traced rays', final: 'final, by traced rays', working: 'working view, by matrices' };
-const MEASURED = { moving: 'moving, its ghosts and glow', draft: 'its ghosts and glow', soon: 'its ghosts and glow', final: 'measured, with all that was photographed' };
-const FIRST = 'drawing the first picture; the very first on a machine takes some ten seconds';
+const MEASURED = { moving: 'moving, its ghosts and glow', draft: 'its ghosts and glow', soon: 'its ghosts and glow', final: 'measured, with the residual of its photographs' };
+const FIRST = 'drawing the first picture; the very first on a computer takes some ten seconds';
 function gradeWords({ grade: drawn, seconds, number, current, problem }) {
   const { mover, shownGrade, shownNumber } = app.view;
   const named = app.state.lens.measured ? MEASURED : GRADES;
   if (!drawn) return problem ? 'no picture yet' : FIRST;
   if (problem) return 'the last good picture';
-  // what a hand holds is of no project yet, but it is what is shown
-  if (!mover.live && !current) return shownGrade === 'moving' ? named.moving : 'the picture before, until the new one is drawn';
+  // during a drag the shown picture belongs to no project state
+  if (!mover.live && !current) return shownGrade === 'moving' ? named.moving : 'the previous picture, until the new one is drawn';
   const words = named[shownGrade] ?? named[drawn];
   if (shownNumber !== number || !seconds) return words;
   return `${words} · ${seconds < 1 ? `${Math.round(seconds * 1000)} ms` : `${seconds.toFixed(1)} s`}`;
@@ -363,7 +365,7 @@ function status() {
   if (!app.state) return;
   const { picture, frame, camera } = app.state;
   const words = gradeWords(picture);
-  // a hand asks for this with each of its pictures
+  // called for each picture of a drag
   if (grade.textContent !== words) grade.textContent = words;
   size.textContent = `${camera.size_px.join(' × ')} px · ${frame.sensor.map((mm) => Number(mm.toFixed(2))).join(' × ')} mm`;
   remark.textContent = app.state.remarks.join(' · ');
@@ -377,7 +379,7 @@ const panels = {
 };
 const NAMES = { light: 'Light', ghosts: 'Ghosts', lens: 'Lens', iris: 'Iris', coating: 'Coating', target: 'Target', library: 'Library' };
 app.panels = panels;
-// how far down each panel was left
+// scroll position of each panel
 const scrolled = {};
 app.open = (tab) => {
   scrolled[app.tab] = $('page').scrollTop;
@@ -406,17 +408,17 @@ function tabs() {
 // ---------------------------------------------------------------------------------------------------------- shortcuts
 const KEYS = [
   ['Drag', 'move the light, also out of the frame'], ['Click', 'choose the ghost under the pointer'],
-  ['Scroll on it', 'walk through the ghosts there'], ['Scroll', 'zoom, also PgUp and PgDn'], ['Alt + drag', 'pan, also the middle button and Ctrl + arrows'],
-  ['Arrows', 'move the light by 0.1°, Shift 1°'], ['F', 'fit the frame'], ['Z', 'zoom to 1:1'], ['A', 'exposure found anew'], ['+  −', 'exposure by half a stop'],
-  ['V', 'next view'], ['G', 'grey: every ghost reflects alike'], ['E', 'no entrance clipping'], ['H', 'safe frame'],
+  ['Scroll on it', 'step through the ghosts there'], ['Scroll', 'zoom, also PgUp and PgDn'], ['Alt + drag', 'pan, also the middle button and Ctrl + arrows'],
+  ['Arrows', 'move the light by 0.1°, Shift 1°'], ['F', 'fit the frame'], ['Z', 'zoom to 1:1'], ['A', 'automatic exposure'], ['+  −', 'exposure by half a stop'],
+  ['V', 'next view'], ['G', 'grey: equal reflectances'], ['E', 'no entrance clipping'], ['H', 'safe frame'],
   ['S', 'solo the chosen ghost'], ['M', 'mute the chosen ghost'], ['N  P', 'next, previous ghost of the list'],
   ['T', 'play the light’s path, stop'], ['K', 'key the light at this time'], [', .', 'previous, next key'],
   ['X', 'show or hide the cross-section'], ['1 – 7', 'panels'], ['W', 'physical, target, wipe, side by side'], ['[  ]', 'move the wipe'], ['Ctrl+Z', 'undo'],
-  ['Ctrl+Shift+Z', 'redo'], ['Ctrl+S', 'save'], ['Ctrl+Shift+S', 'save under another name'], ['O', 'open'], ['Esc', 'let go of the ghost'], ['?', 'this sheet'],
+  ['Ctrl+Shift+Z', 'redo'], ['Ctrl+S', 'save'], ['Ctrl+Shift+S', 'save under another name'], ['O', 'open'], ['Esc', 'deselect the ghost'], ['?', 'this list'],
 ];
-function help() { dialog('Keys and hands', h('div', { class: 'keys' }, ...KEYS.flatMap(([key, words]) => [h('kbd', {}, key), h('span', {}, words)]))); }
+function help() { dialog('Keys and mouse', h('div', { class: 'keys' }, ...KEYS.flatMap(([key, words]) => [h('kbd', {}, key), h('span', {}, words)]))); }
 let nudging = null;
-// keys come faster than answers: they go on from where they were
+// keys repeat faster than answers: continue from the last requested place
 const ahead = { asked: 0, light: null, place: null };
 function nudge(dx, dy, big) {
   const light = app.state.lights[app.light];
@@ -439,8 +441,8 @@ addEventListener('keydown', (event) => {
     const key = event.key.toLowerCase();
     if (key === 's') { event.preventDefault(); document.activeElement.blur(); if (event.shiftKey) saveAs(); else save(); }
     if (typing) return;
-    if (key === 'z') { event.preventDefault(); app.step(event.shiftKey ? '/api/redo' : '/api/undo'); }
-    if (key === 'y') { event.preventDefault(); app.step('/api/redo'); }
+    if (key === 'z') { event.preventDefault(); app.step(event.shiftKey ? 'api/redo' : 'api/undo'); }
+    if (key === 'y') { event.preventDefault(); app.step('api/redo'); }
     if (ARROWS[event.key] && onPage) { event.preventDefault(); const [x, y] = ARROWS[event.key]; app.view.pan(-PAN_PX * x, PAN_PX * y); }
     return;
   }
@@ -453,7 +455,7 @@ addEventListener('keydown', (event) => {
   if (event.key === ' ' && onPage) { event.preventDefault(); app.view.space = true; return; }
   const looks = ['filmic', 'srgb', ...(app.state.aces ? ['aces'] : []), 'false-colour'];
   const work = {
-    f: () => app.view.fit(), z: () => app.view.fit(app.state.frame.full[0] / app.view.frame().w * app.view.zoom / (devicePixelRatio || 1)), a: () => app.ask('/api/expose'),
+    f: () => app.view.fit(), z: () => app.view.fit(app.state.frame.full[0] / app.view.frame().w * app.view.zoom / (devicePixelRatio || 1)), a: () => app.ask('api/expose'),
     '+': () => app.setView({ exposure_stops: view.stops + 0.5 }), '=': () => app.setView({ exposure_stops: view.stops + 0.5 }), '-': () => app.setView({ exposure_stops: view.stops - 0.5 }),
     v: () => app.setView({ look: looks[(looks.indexOf(view.look) + 1) % looks.length] }), g: () => app.setView({ grey: !view.grey }),
     e: () => app.setView({ unclipped: !view.unclipped }), h: () => app.setView({ safe_frame: !view.safe_frame }),
@@ -468,17 +470,17 @@ addEventListener('keydown', (event) => {
 
 // ---------------------------------------------------------------------------------------------------------- dropping
 export async function importFile(file, as = '', light = null) {
-  const answer = await app.ask(`/api/import?name=${encodeURIComponent(file.name)}${as ? `&as=${as}` : ''}${light === null ? '' : `&light=${light}`}`, file);
+  const answer = await app.ask(`api/import?name=${encodeURIComponent(file.name)}${as ? `&as=${as}` : ''}${light === null ? '' : `&light=${light}`}`, file);
   if (!answer) return;
-  // what was noticed in the file before is of no use beside this one
+  // remarks on the previous file are outdated
   forget('noticed');
   toast(`Opened ${file.name}`, 'good', 4500, 'opened');
-  // beside the picture, for it must stop nobody
-  if (answer.told?.length) toast(h('ul', { class: 'remarks' }, ...answer.told.map((words) => h('li', {}, sentence(words)))), 'info', 20000, 'noticed');
+  // a toast, as a dialog would interrupt the user
+  if (answer.reported?.length) toast(h('ul', { class: 'remarks' }, ...answer.reported.map((words) => h('li', {}, sentence(words)))), 'info', 20000, 'noticed');
 }
 app.importFile = importFile;
 let over = 0;
-// files alone are taken: words that are chosen and dragged are none
+// accept files only, not dragged text
 const carriesFiles = (event) => [...event.dataTransfer?.types ?? []].includes('Files');
 addEventListener('dragstart', (event) => event.preventDefault());
 addEventListener('dragenter', (event) => { event.preventDefault(); if (!carriesFiles(event)) return; over += 1; $('drop').hidden = false; });
@@ -493,7 +495,7 @@ addEventListener('drop', async (event) => {
 
 // ---------------------------------------------------------------------------------------------------------- listening
 function listen() {
-  const socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`);
+  const socket = new WebSocket(socketAddress('ws'));
   app.tell = (words) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(words)); };
   socket.onopen = () => { if (app.view.room) app.tell({ room: app.view.room }); hush('lost'); if (listen.lost) { toast('The editor is back.', 'good'); listen.lost = false; app.state = null; app.view.shownNumber = -1; } reload(); loadGhosts(); };
   socket.onmessage = (message) => hear(JSON.parse(message.data));
@@ -511,7 +513,7 @@ function hear(event) {
   if (event.type === 'export') { working('EXR', event.part); return; }
   if (event.type === 'ghosts') { working('', 1); loadGhosts(); return; }
   if (!state) return;
-  // the target's ghosts are as bright as those of the last final picture
+  // the brightness of the target's ghosts follows the last final picture
   if (event.type === 'matched') app.view.refreshTarget();
   if (event.type === 'picture') {
     state.picture = event;
@@ -525,11 +527,11 @@ function hear(event) {
   }
   if (event.type === 'solve') { state.solve = event; panels.target.update?.(state); }
 }
-app.remarks = latest(async () => { const fresh = await get('/api/state'); if (app.state) { app.state.remarks = fresh.remarks; status(); } });
+app.remarks = latest(async () => { const fresh = await get('api/state'); if (app.state) { app.state.remarks = fresh.remarks; status(); } });
 
 app.view = viewport($('view'), app);
 const parts = [header()];
-$('section').append(h('div', { class: 'head' }, told, h('span', { class: 'gap' }), fold), drawing);
+$('section').append(h('div', { class: 'head' }, reported, h('span', { class: 'gap' }), fold), drawing);
 $('status').append(grade, meter, what, h('span', { class: 'gap' }), remark, size);
 tabs();
 folded();

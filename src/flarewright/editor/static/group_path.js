@@ -5,23 +5,23 @@ export function pathGroup(app) {
   const { player } = app;
   const span = () => Math.max(5, Math.ceil(app.state?.path_s ?? 0), Math.ceil(player.at));
   const keys = () => app.state.lights[app.light].keys;
-  const bar = h('input', { type: 'range', min: 0, step: 0.01, value: 0, name: 'path_at', 'aria-label': 'Time on the path, seconds', tip: 'Along the path by hand: drafts while it moves, the final picture where it rests.' });
-  const box = h('input', { class: 'number', type: 'text', inputmode: 'decimal', name: 'path_time', 'aria-label': 'Time, seconds', tip: 'Go to a time, also behind the last key, to put the next one there.', style: 'width:56px' });
+  const bar = h('input', { type: 'range', min: 0, step: 0.01, value: 0, name: 'path_at', 'aria-label': 'Time on the path, seconds', tip: 'Time on the path: drafts while the slider moves, the final picture when it rests.' });
+  const box = h('input', { class: 'number', type: 'text', inputmode: 'decimal', name: 'path_time', 'aria-label': 'Time, seconds', tip: 'Go to a time, also after the last key, to set the next key there.', style: 'width:56px' });
   const marks = h('div', { class: 'marks' });
   const body = h('tbody');
   const table = h('table', { class: 'keys' }, h('thead', {}, h('tr', {}, h('th', { scope: 'col' }, 'Seconds'), h('th', { scope: 'col' }, 'Right °'), h('th', { scope: 'col' }, 'Up °'), h('th'))), body);
-  const play = button('▶ Play', () => player.toggle(), { id: 'path-play', tip: 'Plays the light along its path; where it stops the light stays, which undo takes back (T).' });
-  const key = button('Key', () => player.key(), { id: 'path-key', tip: 'Where the light is now is where it shall be at this time (K).' });
+  const play = button('▶ Play', () => player.toggle(), { id: 'path-play', tip: 'Play the path; the light stays where playback stops, as a step that undo reverts (T).' });
+  const key = button('Key', () => player.key(), { id: 'path-key', tip: 'Set a key: the present place of the light at this time (K).' });
   const loop = h('input', { type: 'checkbox', name: 'path_loop' });
-  const clear = button('Remove path', () => app.deed('clear_keys', { light: app.light }).catch(() => {}), { kind: 'quiet', id: 'path-clear', tip: 'Take all keys of this light away; it stays where it is.' });
-  const told = h('p', { class: 'quietly' });
+  const clear = button('Remove path', () => app.command('clear_keys', { light: app.light }).catch(() => {}), { kind: 'quiet', id: 'path-clear', tip: 'Remove all keys of this light; it stays where it is.' });
+  const reported = h('p', { class: 'quietly' });
   loop.addEventListener('change', () => player.setLoop(loop.checked));
   bar.addEventListener('input', () => player.scrub(Number(bar.value)));
   bar.addEventListener('change', () => player.rest());
   box.addEventListener('change', () => {
     const value = number(box.value);
     if (value === null) toast(`Time: “${box.value}” is no number, so it stays ${player.at.toFixed(2)} s.`, 'error', 9000, 'path time');
-    else if (value < 0) toast(`${value} s became 0 s: a path begins there.`, 'info', 9000, 'path time');
+    else if (value < 0) toast(`${value} s became 0 s: a path starts there.`, 'info', 9000, 'path time');
     if (value === null) box.value = player.at.toFixed(2); else player.go(value);
   });
   box.addEventListener('keydown', (event) => { if (event.key === 'Enter') box.blur(); });
@@ -41,7 +41,7 @@ export function pathGroup(app) {
       element.style.left = `${event.clientX - room.left}px`;
     });
     element.addEventListener('pointerup', () => {
-      if (dragged) app.deed('move_key', { light: app.light, number: k, at_s: Number(held.at.toFixed(2)) }).catch(() => { drawn = ''; });
+      if (dragged) app.command('move_key', { light: app.light, number: k, at_s: Number(held.at.toFixed(2)) }).catch(() => { drawn = ''; });
       held = null;
     });
     element.addEventListener('click', () => { if (!dragged) player.go(each.at_s); });
@@ -63,10 +63,10 @@ export function pathGroup(app) {
       return h('td', {}, field);
     };
     const [x, y] = each.field_deg;
-    const place = (field_deg) => app.deed('set_key', { light: app.light, at_s: each.at_s, field_deg });
-    return h('tr', {}, cell(each.at_s, 'seconds', (at_s) => app.deed('move_key', { light: app.light, number: k, at_s })),
+    const place = (field_deg) => app.command('set_key', { light: app.light, at_s: each.at_s, field_deg });
+    return h('tr', {}, cell(each.at_s, 'seconds', (at_s) => app.command('move_key', { light: app.light, number: k, at_s })),
       cell(x, 'right', (value) => place([value, y])), cell(y, 'up', (value) => place([x, value])),
-      h('td', {}, button('×', () => app.deed('remove_key', { light: app.light, number: k }).catch(() => {}), { kind: 'quiet', 'aria-label': `Remove key ${k + 1}` })));
+      h('td', {}, button('×', () => app.command('remove_key', { light: app.light, number: k }).catch(() => {}), { kind: 'quiet', 'aria-label': `Remove key ${k + 1}` })));
   }
   function tick() {
     play.textContent = player.playing ? '■ Stop' : '▶ Play';
@@ -78,8 +78,8 @@ export function pathGroup(app) {
   }
   player.heard = tick;
   const element = h('div', { class: 'group path' }, h('h3', {}, 'Path of the light'),
-    h('div', { class: 'buttons' }, play, key, h('label', { tip: 'From the last key on to the first time again.' }, loop, ' Loop'), box, h('span', { class: 'quietly' }, 's'), h('span', { class: 'gap' }), clear),
-    marks, bar, told, table);
+    h('div', { class: 'buttons' }, play, key, h('label', { tip: 'Restart at time 0 after the last key.' }, loop, ' Loop'), box, h('span', { class: 'quietly' }, 's'), h('span', { class: 'gap' }), clear),
+    marks, bar, reported, table);
   return {
     element,
     update(state) {
@@ -87,12 +87,12 @@ export function pathGroup(app) {
       play.disabled = !(state.path_s > 0);
       clear.disabled = !mine.length;
       table.hidden = !mine.length;
-      told.textContent = mine.length > 1 ? '' : mine.length ? 'Choose another time, move the light, and press Key again.' : 'Put the light where its path begins and press Key.';
+      reported.textContent = mine.length > 1 ? '' : mine.length ? 'Choose another time, move the light, and press Key again.' : 'Move the light to the start of its path and press Key.';
       tick();
       const now = JSON.stringify([app.light, mine, span()]);
       if (now === drawn) return;
       const active = body.contains(document.activeElement) ? document.activeElement : null;
-      // what is being typed is never taken away
+      // keep a field while the user types in it
       if (active && active.value !== active.defaultValue) return;
       drawn = now;
       marks.replaceChildren(...mine.map(mark));

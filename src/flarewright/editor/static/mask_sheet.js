@@ -1,4 +1,4 @@
-// A sheet to draw an iris on: white lets light through.
+// The mask editor: draw an iris, white lets light through.
 import { button, dialog, h } from './ui.js';
 
 const SIDE = 512;
@@ -9,7 +9,7 @@ const SHAPES = {
   Slit: (pen) => pen.rect(SIDE * 0.06, SIDE * 0.44, SIDE * 0.88, SIDE * 0.12),
 };
 
-// A mask so far is gone on with, as its file has it: the iris' rotation turns it in the lens, not on the sheet.
+// Starts with the present mask as in its file: the iris' rotation turns it in the lens, not in the editor.
 export function drawMask(use, iris) {
   const canvas = h('canvas', { width: SIDE, height: SIDE, class: 'sheet', tabindex: 0, role: 'img', 'aria-label': 'The opening: draw with the pointer' });
   const pen = canvas.getContext('2d');
@@ -20,9 +20,9 @@ export function drawMask(use, iris) {
   clear('#000');
   if (iris.mask) {
     const before = new Image();
-    // a mask of any shape spans the opening
-    before.onload = () => { pen.drawImage(before, 0, 0, SIDE, SIDE); canvas.dataset.begun = 'yes'; };
-    before.src = `/api/mask?n=${Date.now()}`;
+    // a mask of any aspect ratio spans the opening
+    before.onload = () => { pen.drawImage(before, 0, 0, SIDE, SIDE); canvas.dataset.started = 'yes'; };
+    before.src = `api/mask?n=${Date.now()}`;
   }
   let last = null;
   const place = (event) => { const box = canvas.getBoundingClientRect(); return [(event.clientX - box.left) * SIDE / box.width, (event.clientY - box.top) * SIDE / box.height]; };
@@ -44,7 +44,7 @@ export function drawMask(use, iris) {
   brush(true);
   const shapes = Object.entries(SHAPES).map(([name, shape]) => button(name, () => stamp(shape), { 'data-shape': name }));
   const box = dialog('Draw the iris', h('p', { class: 'quietly' }, 'Every ghost becomes an image of it, and the starburst its diffraction. The inscribed circle is the opening of the f-number.'),
-    iris.mask && iris.rotation_deg ? h('p', { id: 'mask-turned' }, `In the lens this sheet is turned by ${Number(iris.rotation_deg.toFixed(1))}° (Rotation).`) : '', canvas,
+    iris.mask && iris.rotation_deg ? h('p', { id: 'mask-turned' }, `In the lens this mask is rotated by ${Number(iris.rotation_deg.toFixed(1))}° (Rotation).`) : '', canvas,
     h('div', { class: 'buttons' }, ...both, size, h('span', { class: 'gap' }), button('All blocked', () => clear('#000')), button('All open', () => clear('#fff'))),
     h('div', { class: 'buttons' }, ...shapes, h('span', { class: 'gap' }), button('Cancel', () => box.close()),
       button('Use it', () => canvas.toBlob((blob) => { box.close(); use(new File([blob], 'drawn.png')); }, 'image/png'), { kind: 'main', id: 'mask-use' })));

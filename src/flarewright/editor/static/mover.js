@@ -1,8 +1,8 @@
-// Pictures of what moves, by a hand or along a path: as many as the server makes, and always of the newest place.
-import { complain } from './api.js';
+// Pictures during a drag or playback: as many as the server can draw, always of the newest place.
+import { complain, socketAddress } from './api.js';
 
 export function mover(app, shown) {
-  // two are under way, so that neither side waits
+  // two requests at a time, so that neither side waits
   let under = 0;
   let next = null;
   let sent = 0;
@@ -15,12 +15,12 @@ export function mover(app, shown) {
   self.stop = () => { self.live = false; next = null; };
   self.busy = () => under > 0;
   self.asked = () => sent;
-  // what is under way ends final pictures: whoever wants one waits for it
+  // a request in progress interrupts final pictures, so wait for it before requesting one
   self.idle = async () => { while (under > 0) await new Promise((done) => { setTimeout(done, 5); }); };
 
   function pump() {
     if (!next || under >= 2) return;
-    // the second one leaves shortly before the first is done, so that it asks for the newest place
+    // send the second request shortly before the first is done, so that it has the newest place
     const early = under === 1 ? asked + 0.9 * usual - performance.now() : 0;
     if (early > 1) {
       waiting ||= setTimeout(() => { waiting = 0; pump(); }, early);
@@ -32,12 +32,12 @@ export function mover(app, shown) {
     asked = performance.now();
     ask(now, ++sent).finally(() => { under -= 1; pump(); });
   }
-  // one socket for all pictures: it costs less than a request each
+  // one socket for all pictures: cheaper than a request for each
   let socket = null;
   const waits = new Map();
   function opened() {
     socket ??= new Promise((done, failed) => {
-      const made = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws/moving`);
+      const made = new WebSocket(socketAddress('ws/moving'));
       made.binaryType = 'arraybuffer';
       made.onopen = () => done(made);
       made.onmessage = ({ data }) => {

@@ -1,7 +1,7 @@
-// What only a lens has: beside a measured flare a panel says why it is empty, and single controls go.
+// Panels and controls for lenses only: with a measured flare, a panel explains why it is empty, and controls are hidden.
 import { h } from './ui.js';
 
-const WHY = 'A measured flare has no prescription: its ghosts are as they were photographed. Move and colour its light on the panel Light; mute, brighten and tint its ghosts on the panel Ghosts.';
+const WHY = 'A measured flare has no prescription: its ghosts come from photographs. Move and colour its light on the panel Light; mute, brighten and tint its ghosts on the panel Ghosts.';
 
 export function panelOfLens(panel) {
   const words = h('p', { class: 'group quietly' }, WHY);
@@ -16,7 +16,7 @@ export function panelOfLens(panel) {
   };
 }
 
-// `but` tells of a measured flare that has it all the same.
+// `but`: whether a measured flare has the control as well.
 export function ofLens(control, but = () => false) {
   return {
     element: control.element,

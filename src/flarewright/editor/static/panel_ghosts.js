@@ -1,15 +1,15 @@
-// The table of ghosts, and what is done to the chosen one by hand.
+// The table of ghosts, and overrides of the chosen one.
 import { button, group, h, row, slider } from './ui.js';
 
-const COLUMNS = [['name', 'Ghost', 'First mirror – second mirror, rows counted from the front.'], ['share', 'Light', 'Light of it in the picture, against the brightest ghost.'], ['size', 'Size', 'Root mean square radius in the picture, mm.']];
+const COLUMNS = [['name', 'Ghost', 'First mirror – second mirror, rows counted from the front.'], ['share', 'Light', 'Its light in the picture, relative to the brightest ghost.'], ['size', 'Size', 'Root mean square radius in the picture, mm.']];
 
 export function ghostPanel(app) {
   let by = 'share';
   let down = true;
   const body = h('tbody');
   const heads = COLUMNS.map(([key, words, tip]) => h('th', { class: 'sort', scope: 'col', tip, tabindex: 0, style: key === 'share' ? 'text-align:left' : null, onclick: () => order(key), onkeydown: (event) => event.key === 'Enter' && order(key) }, words));
-  const table = h('table', { class: 'ghosts' }, h('thead', {}, h('tr', {}, ...heads, h('th', { scope: 'col' }, 'By hand'))), body);
-  const told = h('span');
+  const table = h('table', { class: 'ghosts' }, h('thead', {}, h('tr', {}, ...heads, h('th', { scope: 'col' }, 'Override'))), body);
+  const reported = h('span');
   const order = (key) => { down = by === key ? !down : key !== 'name'; by = key; draw(); };
   const rowNumber = (name) => name.split('-').reduce((sum, part) => sum * 1000 + (part === 'sensor' ? 999 : Number(part)), 0);
   const sorted = () => [...app.ghosts.ghosts].sort((a, b) => (by === 'name' ? rowNumber(a.name) - rowNumber(b.name) : a[by] - b[by]) * (down ? -1 : 1));
@@ -28,14 +28,14 @@ export function ghostPanel(app) {
     const linear = [1, 3, 5].map((k) => Number(((parseInt(tint.value.slice(k, k + 2), 16) / 255) ** 2.2).toFixed(4)));
     setGhost({ tint: linear });
   });
-  const hands = group('Chosen ghost', [
-    slider({ label: 'Gain', tip: 'Multiplies the light of this ghost; 1 is physics.', min: 0, max: 20, step: 0.01, curve: 3, name: 'ghost_gain', get: () => chosen()?.gain ?? 1, set: (gain, held) => setGhost({ gain }, held) }),
-    row('Tint', 'Multiplies its colour; white is physics. To get a colour from real coatings, use the Coating panel.', [tint, button('White', () => setGhost({ tint: [1, 1, 1] }), { kind: 'quiet' })], () => { tint.value = hex(chosen()?.tint ?? [1, 1, 1]); }),
+  const controls = group('Chosen ghost', [
+    slider({ label: 'Gain', tip: 'Factor on the light of this ghost; 1 is physical.', min: 0, max: 20, step: 0.01, curve: 3, name: 'ghost_gain', get: () => chosen()?.gain ?? 1, set: (gain, held) => setGhost({ gain }, held) }),
+    row('Tint', 'Factor on its colour; white is physical. For a colour by real coatings, use the Coating panel.', [tint, button('White', () => setGhost({ tint: [1, 1, 1] }), { kind: 'quiet' })], () => { tint.value = hex(chosen()?.tint ?? [1, 1, 1]); }),
   ]);
   const solo = button('Solo', () => self.solo(), { tip: 'Show this ghost alone (S).', id: 'solo' });
-  const mute = button('Mute', () => self.mute(), { tip: 'Leave this ghost out (M).', id: 'mute' });
-  const reset = button('Physics again', () => app.deed('reset_art', {}).catch(() => {}), { tip: 'Forget all gains, tints, mutes and solos.' });
-  const head = h('div', { class: 'group' }, h('h3', {}, 'Ghosts', h('span', { class: 'gap' }), told), h('div', { class: 'buttons' }, solo, mute, reset));
+  const mute = button('Mute', () => self.mute(), { tip: 'Hide this ghost (M).', id: 'mute' });
+  const reset = button('Reset', () => app.command('reset_art', {}).catch(() => {}), { tip: 'Remove all gains, tints, mutes and solos.' });
+  const head = h('div', { class: 'group' }, h('h3', {}, 'Ghosts', h('span', { class: 'gap' }), reported), h('div', { class: 'buttons' }, solo, mute, reset));
 
   function line(ghost) {
     const muted = ghost.muted || (solos().length > 0 && !solos().includes(ghost.name));
@@ -50,7 +50,7 @@ export function ghostPanel(app) {
       const next = { ArrowDown: element.nextSibling, ArrowUp: element.previousSibling }[event.key];
       if (next) { event.preventDefault(); next.focus(); }
     });
-    // what the mouse shows, the keyboard shows too
+    // keyboard focus shows the same outline as the mouse
     element.addEventListener('focus', () => { if (element.matches(':focus-visible')) app.view.hoverGhost(ghost.name); });
     element.addEventListener('blur', () => app.view.hoverGhost(null));
     element.addEventListener('pointerenter', () => { element.classList.add('over'); app.view.hoverGhost(ghost.name); });
@@ -61,24 +61,24 @@ export function ghostPanel(app) {
     heads.forEach((head_, k) => { head_.textContent = COLUMNS[k][1] + (by === COLUMNS[k][0] ? (down ? ' ▾' : ' ▴') : ''); });
     const held = document.activeElement?.dataset?.ghost;
     body.replaceChildren(...sorted().map(line));
-    // the keyboard goes with the ghost, wherever the order puts it
+    // keep the keyboard focus on the ghost when the order changes
     if (held !== undefined) [...body.children].find((each) => each.dataset.ghost === held)?.focus({ preventScroll: true });
     body.querySelector('.chosen')?.scrollIntoView({ block: 'nearest' });
   }
   const self = {
-    element: h('div', {}, head, hands.element, table),
+    element: h('div', {}, head, controls.element, table),
     update(state) {
       const mine = chosen();
-      told.textContent = app.ghosts.fresh ? `${app.ghosts.ghosts.length} in the picture` : 'being measured…';
-      hands.element.hidden = !mine;
-      if (mine) hands.update(state);
+      reported.textContent = app.ghosts.fresh ? `${app.ghosts.ghosts.length} in the picture` : 'being measured…';
+      controls.element.hidden = !mine;
+      if (mine) controls.update(state);
       solo.disabled = mute.disabled = !app.ghost;
       solo.classList.toggle('on', Boolean(app.ghost) && state.solo.includes(app.ghost));
       mute.classList.toggle('on', Boolean(mine?.muted));
       reset.disabled = !state.by_hand;
       draw();
     },
-    solo() { if (app.ghost) app.deed('set_solo', { names: solos().includes(app.ghost) ? [] : [app.ghost] }).catch(() => {}); else if (solos().length) app.deed('set_solo', { names: [] }).catch(() => {}); },
+    solo() { if (app.ghost) app.command('set_solo', { names: solos().includes(app.ghost) ? [] : [app.ghost] }).catch(() => {}); else if (solos().length) app.command('set_solo', { names: [] }).catch(() => {}); },
     mute() { const ghost = chosen(); if (ghost) setGhost({ muted: !ghost.muted }); },
     step(by_) {
       const names = sorted().map((ghost) => ghost.name);

@@ -1,17 +1,17 @@
-// The prescription: every cell can be written; what is to be said stands beside it.
+// The prescription: an editable table with remarks on its cells.
 import { complain, get, latest, post, sentence } from './api.js';
 import { button, entry, group, h } from './ui.js';
 
 const COLUMNS = [
-  ['radius', 'Radius', 'Of curvature, mm: positive when its centre lies behind the surface; "flat" for a plane.'],
+  ['radius', 'Radius', 'Radius of curvature, mm: positive when its centre lies behind the surface; "flat" for a plane.'],
   ['thickness', 'Gap', 'Distance to the next surface, mm.'],
-  ['glass', 'Glass', 'What fills the gap behind the surface: a catalogue name, or empty for air.'],
-  ['n_d', 'n_d', 'Index at 587.6 nm: how strongly the glass bends light, and how much bare glass reflects.'],
-  ['v_d', 'V_d', 'Abbe number: the smaller, the more the glass spreads colours.'],
-  ['semi_diameter', 'Semi', 'Half the clear diameter, mm: rims cut ghosts. In italics: estimated.'],
-  ['coating', 'Coating', 'none, quarter-wave:550, film:1.38:96, early-multicoat… What is coated well makes faint ghosts.'],
+  ['glass', 'Glass', 'Glass behind the surface: a catalogue name, or empty for air.'],
+  ['n_d', 'n_d', 'Index at 587.6 nm: it determines refraction, and the reflection of bare glass.'],
+  ['v_d', 'V_d', 'Abbe number: a smaller one means more dispersion.'],
+  ['semi_diameter', 'Semi', 'Half the clear diameter, mm: rims clip ghosts. In italics: estimated.'],
+  ['coating', 'Coating', 'none, quarter-wave:550, film:1.38:96, early-multicoat… Good coatings make faint ghosts.'],
 ];
-// as many digits as are shown, and a usual coating
+// wide enough for the shown digits and a usual coating
 const WIDTHS = ['22px', '56px', '52px', '51px', '52px', '52px', '45px', ''];
 const NAMES = ['glass', 'coating'];
 
@@ -20,32 +20,32 @@ export function lensPanel(app) {
   const head = h('tr', {}, h('th', {}, '#'), ...COLUMNS.map(([column, words, tip]) => h('th', { scope: 'col', tip, class: NAMES.includes(column) ? 'name' : null }, words)));
   const table = h('table', { class: 'rows', style: 'table-layout:fixed' }, h('colgroup', {}, ...WIDTHS.map((width) => h('col', { style: width ? `width:${width}` : '' }))), h('thead', {}, head), body);
   const wrong = h('div', { class: 'wrong', role: 'alert' });
-  // in sight however long the table is
+  // stays visible below a long table
   const notes = h('div', { class: 'group quietly notes' });
   const glasses = h('datalist', { id: 'glasses' });
   const facts = h('div', { class: 'facts' });
   const source = h('p', { class: 'quietly' });
   let refused = null;
-  // the row that was written last: what there is to say about it stays in sight when the hand has gone on to the next
+  // the last edited row: its remarks stay visible when the focus moves to the next row
   let written = null;
   let drawn = '';
-  const search = latest(async (words) => { glasses.replaceChildren(...(await get(`/api/glasses?q=${encodeURIComponent(words)}`)).glasses.map((name) => h('option', { value: name }))); });
+  const search = latest(async (words) => { glasses.replaceChildren(...(await get(`api/glasses?q=${encodeURIComponent(words)}`)).glasses.map((name) => h('option', { value: name }))); });
 
   async function write(box, row, column, text, table) {
     refused = null;
     drawn = '';
     written = { row, table };
-    try { await app.deed_quiet('set_cell', { row, column, text }, table); wrong.textContent = ''; } catch (error) {
-      const state = await get('/api/state').catch(() => null);
+    try { await app.commandQuietly('set_cell', { row, column, text }, table); wrong.textContent = ''; } catch (error) {
+      const state = await get('api/state').catch(() => null);
       if (!state) {
-        // the editor is gone, and nothing was written
+        // no connection: nothing was written
         complain(error);
         draw(app.state);
         return;
       }
       app.take(state);
       if (app.table() !== table) {
-        // there is no such cell any more
+        // the cell does not exist any more
         draw(app.state);
         wrong.textContent = sentence(error.message);
         return;
@@ -63,7 +63,7 @@ export function lensPanel(app) {
     const table = app.table();
     const note = line.notes[column];
     const guess = column === 'semi_diameter' && line.estimated;
-    // an estimate has no more digits than fit
+    // round an estimate to the digits that fit
     const value = guess ? Number(line[column]).toFixed(2) : line[column] ?? '';
     const box = h('input', { type: 'text', value, tip: note, class: `${note ? 'note' : ''} ${guess ? 'guess' : ''}`, 'aria-label': `row ${line.row} ${column}`, 'data-row': line.row, 'data-column': column, spellcheck: 'false', list: column === 'glass' ? 'glasses' : null });
     if (refused && refused.row === line.row && refused.column === column) { box.value = refused.text; mark(box); }
@@ -86,7 +86,7 @@ export function lensPanel(app) {
     if (key === drawn && !refused) return;
     const active = document.activeElement;
     const here = active && body.contains(active) && active.dataset.column ? { row: active.dataset.row, column: active.dataset.column } : null;
-    // what is being typed is never taken away; the table follows when it is written
+    // keep a field while the user types in it; redraw the table afterwards
     if (here && active.value !== active.defaultValue && !active.classList.contains('bad')) { active.addEventListener('blur', () => draw(app.state), { once: true }); return; }
     drawn = key;
     body.replaceChildren(...state.lens.rows.map((line) => {
@@ -107,22 +107,22 @@ export function lensPanel(app) {
     for (const line of body.children) line.classList.toggle('chosen', Number(line.dataset.line) === app.row);
     const line = app.state?.lens.rows.find((each) => each.row === app.row);
     const other = written && written.table === app.state?.lens.table && written.row !== app.row ? app.state.lens.rows[written.row] : null;
-    const told = (one, where) => Object.entries(one?.notes ?? {}).map(([column, words]) => h('div', {}, `${where}${COLUMNS.find(([key]) => key === column)?.[1] ?? column}: ${words}`));
-    notes.replaceChildren(...told(other, `row ${written?.row}, `), ...told(line, ''));
+    const reported = (one, where) => Object.entries(one?.notes ?? {}).map(([column, words]) => h('div', {}, `${where}${COLUMNS.find(([key]) => key === column)?.[1] ?? column}: ${words}`));
+    notes.replaceChildren(...reported(other, `row ${written?.row}, `), ...reported(line, ''));
     for (const each of [add, copy, remove, stop]) each.disabled = !line;
     if (line) { copy.disabled = remove.disabled = stop.disabled = line.stop; }
   }
-  const rowDeed = (name) => () => app.deed(name, { row: app.row }, '', app.table).catch(() => {});
-  const add = button('Add row', rowDeed('add_row'), { tip: 'A plane surface behind the chosen row, in the middle of its gap.', id: 'add-row' });
-  const copy = button('Duplicate', rowDeed('duplicate_row'), { tip: 'The same surface once more behind the chosen row.' });
-  const remove = button('Remove', rowDeed('remove_row'), { id: 'remove-row', tip: 'Take the chosen row out; the gap in front of it takes its room.' });
-  const stop = button('Stop here', rowDeed('move_stop'), { id: 'move-stop', tip: 'The iris moves into the air in front of the chosen row, or behind it where in front is glass. The lens stays as sharp; which rays pass, and so the size of its ghosts, changes.' });
+  const rowCommand = (name) => () => app.command(name, { row: app.row }, '', app.table).catch(() => {});
+  const add = button('Add row', rowCommand('add_row'), { tip: 'Insert a plane surface behind the chosen row, in the middle of its gap.', id: 'add-row' });
+  const copy = button('Duplicate', rowCommand('duplicate_row'), { tip: 'Insert a copy of the chosen row behind it.' });
+  const remove = button('Remove', rowCommand('remove_row'), { id: 'remove-row', tip: 'Remove the chosen row; the gap in front of it absorbs its thickness.' });
+  const stop = button('Stop here', rowCommand('move_stop'), { id: 'move-stop', tip: 'Move the iris into the air in front of the chosen row, or behind it if glass is in front. Sharpness is unchanged, but other rays pass, so the ghosts change their size.' });
   const own = group('Lens', [
-    entry({ label: 'Name', tip: 'Of the lens.', words: true, needed: 'a lens needs a name', name: 'lens_name', get: (s) => s.lens.name, set: (name) => app.deed('set_lens_facts', { values: { name } }).catch(() => {}) }),
-    entry({ label: 'Wide open', tip: 'The smallest f-number: sets how far the stop opens.', name: 'open', needed: 'needs a number', get: (s) => s.lens.open, set: (f_number) => app.deed('set_lens_facts', { values: { f_number } }).catch(() => {}) }),
+    entry({ label: 'Name', tip: 'Name of the lens.', words: true, needed: 'a lens needs a name', name: 'lens_name', get: (s) => s.lens.name, set: (name) => app.command('set_lens_facts', { values: { name } }).catch(() => {}) }),
+    entry({ label: 'Wide open', tip: 'The smallest f-number: determines the largest stop diameter.', name: 'open', needed: 'needs a number', get: (s) => s.lens.open, set: (f_number) => app.command('set_lens_facts', { values: { f_number } }).catch(() => {}) }),
   ]);
-  app.deed_quiet = async (name, values, table) => {
-    await app.line(async () => app.take(await post('/api/do', { name, values, table })));
+  app.commandQuietly = async (name, values, table) => {
+    await app.line(async () => app.take(await post('api/do', { name, values, table })));
   };
   const picker = h('input', { type: 'file', accept: '.lens,.toml,.zmx', hidden: true });
   picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0]); picker.value = ''; });

@@ -1,31 +1,31 @@
-// The lenses and looks that ship, each with its picture.
+// The shipped lenses and looks, each with a picture.
 import { get } from './api.js';
 import { h } from './ui.js';
 
 export function libraryPanel(app) {
   let lenses = null;
   let looks = [];
-  const box = h('input', { type: 'text', placeholder: 'Search by name, maker, patent or look', name: 'search', style: 'width:100%', tip: 'Every word must occur in name, maker, patent, f-number or notes.', 'aria-label': 'Search lenses and looks' });
-  const shelf = h('div', { class: 'library' });
-  const wardrobe = h('div', { class: 'library', id: 'looks' });
-  const heading = h('h3', { class: 'quietly', style: 'margin:8px 14px 0', tip: 'A look is put on the lens and the lights that are there: coatings, iris, dirt, colours. Undo takes it off.' }, 'Looks');
-  const told = h('p', { class: 'quietly' });
+  const box = h('input', { type: 'text', placeholder: 'Search by name, maker, patent or look', name: 'search', style: 'width:100%', tip: 'Finds entries that contain every word in name, maker, patent, f-number or notes.', 'aria-label': 'Search lenses and looks' });
+  const lensGrid = h('div', { class: 'library' });
+  const lookGrid = h('div', { class: 'library', id: 'looks' });
+  const heading = h('h3', { class: 'quietly', style: 'margin:8px 14px 0', tip: 'A look sets coatings, iris, dirt and colours of the present lens and lights. Undo reverts it.' }, 'Looks');
+  const reported = h('p', { class: 'quietly' });
   box.addEventListener('input', draw);
-  async function choose(name) { try { await app.deed('choose_lens', { lens: name }); } catch (error) { void error; } }
-  async function wear(name) { try { await app.deed('put_look', { name }); } catch (error) { void error; } }
-  const picture = (kind, name) => h('img', { alt: '', src: `/api/thumbnail/${kind}/${name}`, loading: 'lazy' });
+  async function choose(name) { try { await app.command('choose_lens', { lens: name }); } catch (error) { void error; } }
+  async function wear(name) { try { await app.command('put_look', { name }); } catch (error) { void error; } }
+  const picture = (kind, name) => h('img', { alt: '', src: `api/thumbnail/${kind}/${name}`, loading: 'lazy' });
   function draw() {
     if (!lenses) return;
     const words = box.value.toLowerCase().split(/\s+/).filter(Boolean);
     const matching = (all) => all.filter((one) => words.every((word) => one.words.includes(word)));
-    shelf.replaceChildren(...matching(lenses).map((lens) => h('button', { type: 'button', class: app.state?.lens.shipped === lens.name ? 'on' : '', 'data-lens': lens.name, onclick: () => choose(lens.name), tip: lens.source }, picture('lens', lens.name), h('span', {}, lens.title), h('small', {}, `f/${lens.f_number} · ${lens.rows - 1} surfaces`))));
-    wardrobe.replaceChildren(...matching(looks).map((look) => h('button', { type: 'button', 'data-look': look.name, onclick: () => wear(look.name), tip: look.notes }, picture('look', look.name), h('span', {}, look.title))));
-    heading.hidden = !wardrobe.children.length;
-    told.textContent = shelf.children.length || wardrobe.children.length ? '' : 'No lens and no look is called like this. A lens file can be dropped on the page.';
+    lensGrid.replaceChildren(...matching(lenses).map((lens) => h('button', { type: 'button', class: app.state?.lens.shipped === lens.name ? 'on' : '', 'data-lens': lens.name, onclick: () => choose(lens.name), tip: lens.source }, picture('lens', lens.name), h('span', {}, lens.title), h('small', {}, `f/${lens.f_number} · ${lens.rows - 1} surfaces`))));
+    lookGrid.replaceChildren(...matching(looks).map((look) => h('button', { type: 'button', 'data-look': look.name, onclick: () => wear(look.name), tip: look.notes }, picture('look', look.name), h('span', {}, look.title))));
+    heading.hidden = !lookGrid.children.length;
+    reported.textContent = lensGrid.children.length || lookGrid.children.length ? '' : 'No lens or look matches. A lens file can be dropped on the page.';
   }
   return {
-    element: h('div', {}, h('div', { class: 'group' }, box, told), shelf, heading, wardrobe),
-    async shown() { if (!lenses) { try { ({ lenses, looks } = await get('/api/library')); draw(); } catch (error) { void error; } } },
-    update(state) { for (const each of shelf.children) each.classList.toggle('on', each.dataset.lens === state.lens.shipped); },
+    element: h('div', {}, h('div', { class: 'group' }, box, reported), lensGrid, heading, lookGrid),
+    async shown() { if (!lenses) { try { ({ lenses, looks } = await get('api/library')); draw(); } catch (error) { void error; } } },
+    update(state) { for (const each of lensGrid.children) each.classList.toggle('on', each.dataset.lens === state.lens.shipped); },
   };
 }

@@ -1,7 +1,7 @@
-// The cross-section in its strip: the server's drawing without its frame, and row numbers that can be read.
+// The cross-section in its strip: the server's drawing without its frame, with readable row numbers.
 
-// The drawing's own headline and foot stand in the head of the strip already; what is left is as large as the strip
-// allows, `across` and `down` px.
+// Remove the drawing's title and footer, which the head of the strip shows already, and scale the lens to the strip of
+// `across` by `down` px.
 export function fitted(svg, across, down) {
   const [, , width, height] = svg.getAttribute('viewBox').split(' ').map(Number);
   svg.querySelectorAll('text').forEach((text) => { if (Number(text.getAttribute('y')) < 30) text.remove(); });
@@ -21,8 +21,8 @@ export function fitted(svg, across, down) {
   number(svg, names, { left, wide, top, height: low - top + 4 }, across, down);
 }
 
-// Places as near as can be to the wanted ones for things in a row that have widths: what would meet stands in a cluster
-// around its own middle (isotonic regression of what is left of a place once those before it have theirs).
+// Places for labels in a row without overlap, as near as possible to the wanted ones: labels that would overlap form a
+// cluster around their mean (isotonic regression of the places minus the widths before them).
 function spread(wanted, widths) {
   const before = widths.map((width, k) => widths.slice(0, k).reduce((sum, each) => sum + each, 0) + width / 2);
   const clusters = [];
@@ -37,18 +37,17 @@ function spread(wanted, widths) {
   return clusters.flatMap(({ mean, count }) => Array(count).fill(mean)).map((place, k) => place + before[k]);
 }
 
-// Row numbers are as large as all other words, whatever the scale; those of close rows spread, each with a line to its
-// row.
+// Draw row numbers at text size for any scale; spread the numbers of close rows, each with a line to its row.
 function number(svg, names, { left, wide, top, height }, across, down) {
   const widths = names.map((text) => 7 * text.textContent.length + 4);
-  // where the strip is narrower than they are together, some are left out
+  // if the strip is too narrow, show every n-th number
   const every = Math.ceil(widths.reduce((sum, each) => sum + each, 0) / across);
   const some = (_, k) => k % every === 0;
   const fits = names.filter(some);
   const rows = fits.map((text) => Number(text.getAttribute('x')));
   const placed = (scale) => spread(rows.map((x) => x * scale), widths.filter(some));
   const scaled = (numbers) => Math.min(across / wide, (down - numbers) / (height + 2));
-  // the farther they are from their rows, the longer are the lines
+  // lines are longer if numbers are far from their rows
   const rough = scaled(20);
   const away = Math.max(0, ...placed(rough).map((place, k) => Math.abs(place - rows[k] * rough)));
   const leads = Math.min(26, 4 + 0.3 * away);
@@ -56,7 +55,7 @@ function number(svg, names, { left, wide, top, height }, across, down) {
   const foot = top - 2 - leads / scale;
   const over = (11 + leads) / scale;
   const places = placed(scale);
-  // the drawing stands in the middle of its strip, which they must not leave
+  // the drawing is centred in its strip; keep the numbers inside
   const middle = (left + wide / 2) * scale;
   const aside = Math.max(0, middle - across / 2 - places[0] + 10) - Math.max(0, places.at(-1) + 10 - middle - across / 2);
   places.forEach((place, k) => {

@@ -1,10 +1,12 @@
-// Small building blocks. Every control reads its value from the state and asks for a change; none keeps one of its own.
+// Controls, toasts, dialogs, menus and tooltips. A control reads its value from the state and requests changes.
 export function h(tag, attributes = {}, ...children) {
   const element = document.createElement(tag);
   for (const [key, value] of Object.entries(attributes)) {
     if (value === null || value === undefined || value === false) continue;
     if (key.startsWith('on')) element.addEventListener(key.slice(2), value);
     else if (key === 'class') element.className = value;
+    // the attribute is forbidden by the page's Content-Security-Policy
+    else if (key === 'style') element.style.cssText = value;
     else if (key === 'tip') { element.dataset.tip = value; } else if (value === true) element.setAttribute(key, '');
     else element.setAttribute(key, value);
   }
@@ -12,7 +14,7 @@ export function h(tag, attributes = {}, ...children) {
   return element;
 }
 
-// Puts other children in, and leaves the keyboard where it was: on the one that stands in the same place.
+// Replace children; keyboard focus stays at the same position.
 export function refill(parent, children) {
   const before = [...parent.children].findIndex((child) => child === document.activeElement);
   parent.replaceChildren(...children);
@@ -22,21 +24,21 @@ export function refill(parent, children) {
 let strokes = 0;
 export const stroke = () => `s${Date.now().toString(36)}${strokes++}`;
 
-// `about` is what it is said of: what was said of it before is outdated, and goes.
+// A toast replaces earlier ones with the same `about`.
 export function toast(text, kind = 'info', lasting = kind === 'error' ? 9000 : 4500, about = '') {
   const box = h('div', { class: `toast ${kind}`, 'data-about': about, onclick: () => box.remove() }, text);
-  const shelf = document.getElementById('toasts');
-  // what is said again stands there once, and no more than can be read
-  for (const each of [...shelf.children]) if (each.textContent === box.textContent || (about && each.dataset.about === about)) each.remove();
-  shelf.append(box);
-  // what went wrong stays longest, also where other things went well at the same moment
-  const dated = () => [...shelf.children].find((each) => each !== box && !each.classList.contains('error'));
-  while (shelf.children.length > 3) (dated() ?? shelf.firstChild).remove();
+  const list = document.getElementById('toasts');
+  // drop repetitions, and limit the number
+  for (const each of [...list.children]) if (each.textContent === box.textContent || (about && each.dataset.about === about)) each.remove();
+  list.append(box);
+  // drop errors last
+  const dated = () => [...list.children].find((each) => each !== box && !each.classList.contains('error'));
+  while (list.children.length > 3) (dated() ?? list.firstChild).remove();
   if (Number.isFinite(lasting)) setTimeout(() => box.remove(), lasting);
 }
 
-// What was refused before has been done by now.
-// What was told of something that is no more goes, whatever kind it was.
+// `hush` removes outdated errors on a subject,
+// `forget` all toasts on it.
 export function forget(about) {
   for (const each of [...document.getElementById('toasts').children]) if (each.dataset.about === about) each.remove();
 }
@@ -51,7 +53,7 @@ export function number(text) {
 
 const shown = (value, digits) => (value === null || value === undefined ? '' : String(Number(Number(value).toFixed(digits))));
 
-// What cannot be read goes back to what it was, and this is said.
+// Restore the value of a box with unreadable text, and show an error.
 function unread(box, label, kept, needed = '') {
   const why = box.value.trim() === '' ? needed || 'needs a number' : `“${box.value.trim()}” is no number`;
   box.value = kept;
@@ -72,11 +74,11 @@ export function row(label, tip, fields, update) {
   return { element, update };
 }
 
-// By how many steps a key moves a slider; to an end with Home and End.
+// Number of steps that a key moves a slider; Home and End move it to an end.
 const KEY_STEPS = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10, Home: -Infinity, End: Infinity };
 
-// Slider and box. `set` is called with the value and a group, so that one stroke is one step of the history; `skip` leads
-// a value that a key has reached on to one that there is.
+// A slider with a number box. `set` receives the value and a group, so that one stroke is one step of the history;
+// `skip` maps a value reached by keys to a valid one.
 export function slider({ label, tip, get, set, min, max, step = 0.01, digits = 2, unit = '', curve = 1, name, skip = (value) => value }) {
   const to = (value) => Math.pow(Math.max(0, (value - min) / (max - min)), 1 / curve);
   const from = (part) => min + (max - min) * Math.pow(part, curve);
@@ -84,8 +86,8 @@ export function slider({ label, tip, get, set, min, max, step = 0.01, digits = 2
   const box = h('input', { class: 'number small', type: 'text', inputmode: 'decimal', 'aria-label': label, name });
   let held = null;
   let kept = null;
-  let told = null;
-  // until the server has answered, it stays as the hand left it
+  let reported = null;
+  // keep the user's value until the server has answered
   let asked = 0;
   const ask = (value, group) => {
     asked += 1;
@@ -96,7 +98,7 @@ export function slider({ label, tip, get, set, min, max, step = 0.01, digits = 2
   bar.addEventListener('keydown', (event) => {
     const by = KEY_STEPS[event.key] * (event.shiftKey ? 10 : 1);
     if (!by) return;
-    // the browser's own steps are of the bar: where it is bent they are less than one of the value, and lead nowhere
+    // the browser steps the bar; with a curve that may be less than one step of the value, without effect
     event.preventDefault();
     held ??= stroke();
     kept = skip(Math.max(min, Math.min(max, rounded((kept ?? min) + by * step))), by);
@@ -117,15 +119,15 @@ export function slider({ label, tip, get, set, min, max, step = 0.01, digits = 2
   });
   escapes(box, () => shown(kept, digits));
   function show() {
-    if (asked || !told) return;
-    kept = get(told);
+    if (asked || !reported) return;
+    kept = get(reported);
     if (!bar.matches(':active')) bar.value = to(kept ?? min);
     if (document.activeElement !== box) box.value = shown(kept, digits);
   }
-  return row(label, tip, [bar, box, h('span', { class: 'unit' }, unit)], (state) => { told = state; show(); });
+  return row(label, tip, [bar, box, h('span', { class: 'unit' }, unit)], (state) => { reported = state; show(); });
 }
 
-// `needed` says what an empty box lacks; without it, empty is a value too.
+// `needed`: error for an empty box; without it, empty is a valid value.
 export function entry({ label, tip, get, set, digits = 4, unit = '', placeholder = '', words = false, needed = '', name, list }) {
   const box = h('input', { class: words ? '' : 'number', type: 'text', placeholder, name, list, spellcheck: 'false' });
   let kept = '';
@@ -167,11 +169,11 @@ export function choice({ label, tip, get, set, options, name }) {
   return element;
 }
 
-// `off` says why it cannot be ticked; empty: it can.
+// `off` returns why the box is disabled; empty: enabled.
 export function tick({ label, tip, get, set, name, off = () => '' }) {
   const box = h('input', { type: 'checkbox', name });
   const why = h('span', { class: 'unit' });
-  // until the server has answered, it stays as the hand left it
+  // keep the user's value until the server has answered
   let asked = 0;
   box.addEventListener('change', async () => {
     asked += 1;
@@ -220,7 +222,7 @@ export function menu(anchor, entries) {
   addEventListener('keydown', shut, true);
 }
 
-// Tooltips: one sentence of optics, for the mouse after a moment and for the keyboard at once.
+// Tooltips, for the mouse after a delay and for keyboard focus at once.
 export function tips() {
   let timer = 0;
   const box = h('div', { id: 'tip', role: 'tooltip', hidden: true });
@@ -231,14 +233,14 @@ export function tips() {
     const place = element.getBoundingClientRect();
     const own = box.getBoundingClientRect();
     const panel = document.getElementById('panel');
-    // beside the panel, where it covers no other control
+    // left of the panel, so that it covers no control
     if (panel.contains(element) && !element.closest('#tabs')) {
       box.style.left = `${panel.getBoundingClientRect().left - own.width - 8}px`;
       box.style.top = `${Math.min(place.top, innerHeight - own.height - 8)}px`;
       return;
     }
     if (element.closest('.menu')) {
-      // beside its entries, which all must be read
+      // beside the menu, so that it covers no entry
       box.style.left = `${place.right + 10}px`;
       box.style.top = `${place.top}px`;
       return;

@@ -1,4 +1,4 @@
-// The picture: light and ghosts are touched here. All pixels come from the server; this file only places them.
+// The viewport: dragging lights and ghosts, picking, zoom. All pixels come from the server; this file places them.
 import { complain, get, latest, post } from './api.js';
 import { mover } from './mover.js';
 import { stroke } from './ui.js';
@@ -11,11 +11,11 @@ const DISTORTION_STEP = 2;
 const STEPS = [0, -21, 21, -42, 42];
 const INK = 'rgba(240,176,84,.95)';
 const TARGET = 'target, by matrices';
-// between two targets of a moving hand: so many times as long as one takes, within bounds
+// pause between two target pictures of a drag: this multiple of the time of one, within bounds
 const FOLLOW_MS = 160;
 const FOLLOW_PART = 6;
 const FOLLOW_MOST_MS = 400;
-// a window that changes its size, or a wheel that zooms, is waited for
+// wait for the end of resizing and zooming
 const ROOM_MS = 250;
 
 export function viewport(canvas, app) {
@@ -26,14 +26,14 @@ export function viewport(canvas, app) {
     zoom: 1, panX: 0, panY: 0, drag: null, stack: [], at: 0, spot: null, asked: null, annotate: false, places: [], preview: null,
   };
   let wanted = false;
-  // where words stand in the picture that is being drawn
+  // areas of labels in the present frame
   let taken = null;
   let telling = 0;
 
   // ------------------------------------------------------------------------------------------------------ geometry
   const box = () => ({ w: canvas.clientWidth, h: canvas.clientHeight });
   const doubled = () => self.compare === 'side';
-  // how wide the physical picture's part of the page is
+  // width of the physical picture's part of the page
   const half = () => (doubled() ? box().w / 2 : box().w);
   function frame() {
     const [width, height] = app.state.frame.size;
@@ -44,13 +44,13 @@ export function viewport(canvas, app) {
     const fh = height * fit;
     return { x: room / 2 - fw / 2 + self.panX, y: h / 2 - fh / 2 + self.panY, w: fw, h: fh, mm: fw / app.state.frame.sensor[0], shift: w / 2 };
   }
-  // a lens without an image keeps the handles where they were
+  // a lens without an image keeps the last focal length, and so its handles
   const efl = () => { self.efl = app.state.lens.facts.efl || self.efl || 50; return self.efl; };
-  // millimetres in the upright picture to pixels of the page, and back
+  // from millimetres in the upright picture to pixels of the page, and back
   const toPage = (x, y, f = frame()) => [f.x + f.w / 2 + x * f.mm, f.y + f.h / 2 - y * f.mm * stretch(f)];
   const stretch = (f) => (f.h / app.state.frame.sensor[1]) / f.mm;
   const toMm = (px, py, f = frame()) => [(px - f.x - f.w / 2) / f.mm, -(py - f.y - f.h / 2) / (f.mm * stretch(f))];
-  // Where a light is seen: its ray through the middle of the stop, with the lens' distortion; near lights as the matrices say.
+  // Image place of a light: its chief ray with the lens' distortion; for near lights the paraxial place.
   const distortion = (slope, light) => {
     const known = light.distance ? [] : app.state.lens.distortion ?? [];
     if (!known.length) return 1;
@@ -59,7 +59,7 @@ export function viewport(canvas, app) {
     const before = k ? known[k - 1] : 1;
     return before + (at - k) * (known[k] - before);
   };
-  // where the optical axis meets the picture: a measured one need not be its middle
+  // place of the optical axis in the picture; for a measured flare it may be off the middle
   const axis = () => app.state.lens.axis_mm ?? [0, 0];
   const place = (light) => {
     const slopes = light.field_deg.map((deg) => Math.tan(deg * Math.PI / 180));
@@ -78,7 +78,7 @@ export function viewport(canvas, app) {
   }
   const lightAt = (k) => (self.mover.live && self.mover.lights?.[k]) || app.state.lights[k].field_deg;
   const lightPage = (k) => toPage(...place({ ...app.state.lights[k], field_deg: lightAt(k) }));
-  // a handle far outside is held at the border, so that it can always be taken
+  // keep a handle outside the view at the border, so that it can be dragged
   function handle(k) {
     const [x, y] = lightPage(k);
     const { h } = box();
@@ -111,7 +111,7 @@ export function viewport(canvas, app) {
     if (self.spot && self.spotFrame !== JSON.stringify(f)) self.forget();
     pen.imageSmoothingEnabled = self.zoom < 3;
     pen.imageSmoothingQuality = self.mover.live ? 'low' : 'high';
-    if (doubled()) within(f.shift, w, () => { pen.translate(f.shift, 0); wishedPicture(f, 0); border(f); label(TARGET, f.x + 8, f.y + 16, 'left'); });
+    if (doubled()) within(f.shift, w, () => { pen.translate(f.shift, 0); wantedPicture(f, 0); border(f); label(TARGET, f.x + 8, f.y + 16, 'left'); });
     within(0, half(), () => {
       picture(f, now);
       border(f);
@@ -124,7 +124,7 @@ export function viewport(canvas, app) {
     tellRoom(f, ratio);
     if (self.measure) { self.measure(now); }
   }
-  // A picture that rests is drawn with the pixels that it has on the screen.
+  // Report the frame's size in screen pixels, the size of pictures at rest.
   function tellRoom(f, ratio) {
     const room = [f.w, f.h].map((side) => Math.round(side * ratio));
     if (String(room) === String(self.room)) return;
@@ -132,7 +132,7 @@ export function viewport(canvas, app) {
     clearTimeout(telling);
     telling = setTimeout(() => app.tell({ room: self.room }), ROOM_MS);
   }
-  // Nothing of one half spills over into the other.
+  // Clip drawing to one half.
   function within(from, to, paint) {
     pen.save();
     pen.beginPath();
@@ -141,7 +141,7 @@ export function viewport(canvas, app) {
     paint();
     pen.restore();
   }
-  function wishedPicture(f, from) {
+  function wantedPicture(f, from) {
     if (!self.target) return;
     pen.save();
     pen.beginPath();
@@ -160,7 +160,7 @@ export function viewport(canvas, app) {
     pen.globalAlpha = 1;
     if (part < 1) redraw(); else self.before = null;
     if (self.compare === 'physical' || !self.target) return;
-    if (self.compare !== 'side') wishedPicture(f, self.compare === 'wipe' ? f.w * self.wipe : 0);
+    if (self.compare !== 'side') wantedPicture(f, self.compare === 'wipe' ? f.w * self.wipe : 0);
     if (self.compare === 'wipe') {
       pen.fillStyle = INK;
       pen.fillRect(f.x + f.w * self.wipe - 0.5, f.y, 1, f.h);
@@ -173,7 +173,7 @@ export function viewport(canvas, app) {
     if (self.compare === 'side') label('physical', f.x + 8, f.y + 16, 'left');
     if (self.compare === 'target') label(TARGET, f.x + 8, f.y + 16, 'left');
   }
-  // Words step up or down where others stand already, those of the page among them.
+  // Draw a label, moved up or down if it would overlap other text.
   function label(text, x, y, align) {
     pen.font = '11px system-ui, sans-serif';
     pen.textAlign = align;
@@ -188,7 +188,7 @@ export function viewport(canvas, app) {
     pen.fillStyle = '#ddd';
     pen.fillText(text, x, low);
   }
-  // what the false colours mean: stops from middle grey, written where one ends
+  // legend of the false colours: stops from middle grey at their limits
   function legend(w) {
     const all = app.state.false_colours;
     const wide = 30;
@@ -221,7 +221,7 @@ export function viewport(canvas, app) {
   function overlays(f) {
     if (!self.mover.live) {
       if (self.hover) { pen.globalAlpha = 0.55; pen.drawImage(self.hover, f.x, f.y, f.w, f.h); pen.globalAlpha = 1; }
-      // it is the physical ghost's
+      // the outline belongs to the physical picture
       const part = self.compare === 'wipe' ? self.wipe : self.compare === 'target' ? 0 : 1;
       if (self.outline && part > 0) pen.drawImage(self.outline, 0, 0, self.outline.width * part, self.outline.height, f.x, f.y, f.w * part, f.h);
     }
@@ -232,7 +232,7 @@ export function viewport(canvas, app) {
     pen.setLineDash([5, 5]);
     pen.beginPath(); pen.moveTo(ax, ay); pen.lineTo(bx, by); pen.stroke();
     pen.setLineDash([]);
-    for (const one of wished()) {
+    for (const one of targetCircles()) {
       const chosen = one.key === self.chosenKey();
       if (!chosen && !one.changed) continue;
       const [x, y] = toPage(...line(one.place));
@@ -246,7 +246,7 @@ export function viewport(canvas, app) {
     }
     pen.lineWidth = 1;
   }
-  // the way of a keyed light: straight in field angles, so a little bent in the picture
+  // the path of a keyed light: straight in field angles, so slightly curved in the picture
   function paths(f) {
     pen.strokeStyle = 'rgba(240,176,84,.45)';
     pen.fillStyle = INK;
@@ -289,15 +289,15 @@ export function viewport(canvas, app) {
   };
   self.refresh = latest(async (fade) => {
     const asked = self.mover.asked();
-    // what comes meanwhile is asked for anew
+    // a newer picture triggers another call
     const { number, grade, current, lights: drawn } = app.state.picture;
-    // what a hand holds still gets sharper, until it moves on; neither then nor when it has let go elsewhere does a
-    // picture of another place take that place's
+    // a paused drag shows sharper pictures until it moves again; a picture of another place must not replace that of
+    // the drag
     const late = () => (self.mover.live
       ? self.mover.busy() || self.mover.asked() !== asked || current || String(drawn) !== String(self.mover.lights)
       : self.shownGrade === 'moving' && !current);
     if (late()) return;
-    const answer = await fetch(`/api/picture?n=${number}`);
+    const answer = await fetch(`api/picture?n=${number}`);
     if (!answer.ok) throw new Error((await answer.json()).error);
     const bitmap = await createImageBitmap(await answer.blob());
     if (late()) return;
@@ -311,10 +311,10 @@ export function viewport(canvas, app) {
   });
   self.refreshTarget = latest(async () => {
     if (self.compare === 'physical') return;
-    // what a hand moves is drawn as it goes, and anew when it has let go
+    // during a drag the target follows it, and is redrawn at its end
     self.targetOld = self.mover.live;
     if (self.targetOld) { if (follow.last && !self.mover.busy()) followTarget({ ...follow.last, held: 1 }); return; }
-    const answer = await fetch('/api/target');
+    const answer = await fetch('api/target');
     if (!answer.ok) return;
     const bitmap = await createImageBitmap(await answer.blob());
     self.targetOld = self.mover.live;
@@ -323,13 +323,13 @@ export function viewport(canvas, app) {
     redraw();
   });
   self.see = (compare) => {
-    // nobody has drawn it anew while it was out of sight
+    // a hidden target is not updated, so it is outdated
     if (self.compare === 'physical') self.target = null;
     self.compare = compare;
     self.refreshTarget();
   };
-  // The target follows a hand, or a path that is played, a few times a second; most of the time is the picture's, and it
-  // is painted with the next one.
+  // The target follows a drag or playback a few times a second, leaving most of the time to the picture; it
+  // is painted with the next picture.
   const follow = { values: null, last: null, running: false, stroke: 0 };
   async function followTarget(values) {
     follow.values = follow.last = values;
@@ -339,12 +339,12 @@ export function viewport(canvas, app) {
       while (follow.values && self.mover.live && self.compare !== 'physical') {
         const { values: now, stroke: mine } = follow;
         follow.values = null;
-        const begun = performance.now();
-        const answer = await fetch(`/api/target?${new URLSearchParams({ ...now, revision: app.state.revision })}`);
+        const started = performance.now();
+        const answer = await fetch(`api/target?${new URLSearchParams({ ...now, revision: app.state.revision })}`);
         const bitmap = answer.status === 200 ? await createImageBitmap(await answer.blob()) : null;
-        // it may have let go, and begun anew, meanwhile
+        // another drag may have started meanwhile
         if (bitmap && self.mover.live && mine === follow.stroke) { Object.assign(self, { target: bitmap, targetOld: true }); self.stats.targets.push(performance.now()); if (!self.mover.busy()) redraw(); }
-        await new Promise((done) => { setTimeout(done, Math.min(Math.max(FOLLOW_MS, FOLLOW_PART * (performance.now() - begun)), FOLLOW_MOST_MS)); });
+        await new Promise((done) => { setTimeout(done, Math.min(Math.max(FOLLOW_MS, FOLLOW_PART * (performance.now() - started)), FOLLOW_MOST_MS)); });
       }
     } catch (error) { complain(error); } finally { follow.running = false; }
   }
@@ -354,7 +354,7 @@ export function viewport(canvas, app) {
     self.mover.stop();
   };
   async function overlay(name) {
-    const answer = await fetch(`/api/outline?ghost=${encodeURIComponent(name)}`);
+    const answer = await fetch(`api/outline?ghost=${encodeURIComponent(name)}`);
     return answer.ok ? createImageBitmap(await answer.blob()) : null;
   }
   self.refreshOutline = latest(async () => {
@@ -382,16 +382,16 @@ export function viewport(canvas, app) {
     const drag = self.drag;
     const [mx, my] = toMm(px - drag.offX, py - drag.offY);
     drag.now = anglesAt([mx, my], app.state.lights[drag.light]);
-    // the handle moves with the picture: painting costs more than all else here
+    // redraw the handle with the picture, as painting is the slow part
     self.mover.want({ light: drag.light, x: drag.now[0].toFixed(4), y: drag.now[1].toFixed(4) }, time);
     if (!self.mover.busy()) redraw();
   }
-  // What moved is kept by a deed, and the final picture follows; also where nothing has changed after all.
+  // Store the result of a drag or playback by a command, and show the final picture, also without a change.
   self.settle = async (name, values, group) => {
     self.released = performance.now();
     self.letGo();
     const { revision } = app.state;
-    try { await app.deed(name, values, group); } catch { return; } finally {
+    try { await app.command(name, values, group); } catch { return; } finally {
       self.mover.lights = null;
       if (self.targetOld) self.refreshTarget();
       redraw();
@@ -400,7 +400,7 @@ export function viewport(canvas, app) {
   };
   self.rest = async () => {
     await self.mover.idle();
-    await post('/api/rest');
+    await post('api/rest');
     self.refresh(true);
   };
   async function dropLight() {
@@ -408,27 +408,27 @@ export function viewport(canvas, app) {
     const place = now ?? app.state.lights[light].field_deg;
     app.state.lights[light].field_deg = place.map((deg) => Number(deg.toFixed(4)));
     self.drag = null;
-    // as the hand's last picture had it
+    // the place of the last picture
     await self.settle('move_light', { light, x: Number(place[0].toFixed(4)), y: Number(place[1].toFixed(4)) }, group);
   }
 
   // ---------------------------------------------------------------------------------------------------- annotating
-  // ghosts lie on the line to the first light, wherever a hand has it, as far along as the light is from the axis
+  // ghosts lie on the line to the first light, also during a drag; their distance scales with the light's slope
   const slopes = () => lightAt(0).map((deg) => Math.tan(deg * Math.PI / 180));
   const direction = () => { const [x, y] = slopes(); const far = Math.hypot(x, y); return far ? [x / far, y / far] : [1, 0]; };
   const line = (mm) => direction().map((part) => part * mm);
   self.placeOf = (one) => one.per_slope * Math.hypot(...slopes());
-  self.chosenKey = () => (app.wish !== null && app.wish !== undefined ? `w${app.wish}` : app.ghost);
-  function wished() {
-    const wishes = app.state.design?.wishes ?? [];
+  self.chosenKey = () => (app.ghostTarget !== null && app.ghostTarget !== undefined ? `w${app.ghostTarget}` : app.ghost);
+  function targetCircles() {
+    const ghostTargets = app.state.design?.ghost_targets ?? [];
     const out = self.places.map((one) => {
-      const wish = wishes.find((each) => each.ghost === one.name);
+      const ghostTarget = ghostTargets.find((each) => each.ghost === one.name);
       const unmoved = self.placeOf(one);
-      const place = (wish?.place_mm ?? unmoved) + (wish?.move_mm ?? 0);
-      return { key: one.name, name: one.name, own: { place: unmoved, radius: one.radius }, place, radius: one.radius * (wish?.height ?? 1), changed: Boolean(wish), removed: wish?.action === 'remove' };
+      const place = (ghostTarget?.place_mm ?? unmoved) + (ghostTarget?.move_mm ?? 0);
+      return { key: one.name, name: one.name, own: { place: unmoved, radius: one.radius }, place, radius: one.radius * (ghostTarget?.height ?? 1), changed: Boolean(ghostTarget), removed: ghostTarget?.action === 'remove' };
     });
-    wishes.forEach((wish, number) => {
-      if (!wish.ghost) out.push({ key: `w${number}`, number, place: wish.place_mm + wish.move_mm, radius: wish.radius_mm * wish.height, changed: true });
+    ghostTargets.forEach((ghostTarget, number) => {
+      if (!ghostTarget.ghost) out.push({ key: `w${number}`, number, place: ghostTarget.place_mm + ghostTarget.move_mm, radius: ghostTarget.radius_mm * ghostTarget.height, changed: true });
     });
     if (self.preview) for (const one of out) if (one.key === self.preview.key) Object.assign(one, self.preview);
     return out;
@@ -436,7 +436,7 @@ export function viewport(canvas, app) {
   function grab(px, py) {
     if (!self.annotate) return null;
     const f = frame();
-    const order = wished().sort((a, b) => (b.key === self.chosenKey()) - (a.key === self.chosenKey()));
+    const order = targetCircles().sort((a, b) => (b.key === self.chosenKey()) - (a.key === self.chosenKey()));
     for (const one of order) {
       if (one.key !== self.chosenKey() && !one.key.startsWith('w')) continue;
       const [x, y] = toPage(...line(one.place), f);
@@ -463,11 +463,11 @@ export function viewport(canvas, app) {
     self.drag = null;
     if (!now) return;
     const round = (value) => Number(value.toFixed(3));
-    const wish = one.number !== undefined
-      ? ['set_new_wish', { number: one.number, values: { place_mm: round(now.place), move_mm: 0, radius_mm: round(now.radius), height: 1 } }]
-      : ['set_wish', { ghost: one.name, values: { move_mm: round(now.place - one.own.place), height: Number(Math.max(0.01, Math.abs(now.radius / one.own.radius)).toFixed(4)) } }];
-    // one that is refused is told, and stands where it stood
-    await app.deed(...wish, group).catch(() => {});
+    const ghostTarget = one.number !== undefined
+      ? ['set_new_ghost_target', { number: one.number, values: { place_mm: round(now.place), move_mm: 0, radius_mm: round(now.radius), height: 1 } }]
+      : ['set_ghost_target', { ghost: one.name, values: { move_mm: round(now.place - one.own.place), height: Number(Math.max(0.01, Math.abs(now.radius / one.own.radius)).toFixed(4)) } }];
+    // a rejected command shows an error, and the ghost returns to its place
+    await app.command(...ghostTarget, group).catch(() => {});
     self.preview = null;
     redraw();
   }
@@ -478,10 +478,10 @@ export function viewport(canvas, app) {
     const u = (px - f.x) / f.w;
     const v = (py - f.y) / f.h;
     if (u < 0 || v < 0 || u >= 1 || v >= 1) { app.choose(null); return; }
-    // who scrolls before the answer has come walks when it has
+    // apply scrolling before the answer after it
     const asked = self.asked = { spot: [px, py], steps: 0 };
     try {
-      const { ghosts } = await get(`/api/pick?u=${u}&v=${v}`);
+      const { ghosts } = await get(`api/pick?u=${u}&v=${v}`);
       if (self.asked !== asked) return;
       self.stack = ghosts;
       self.at = 0;
@@ -492,7 +492,7 @@ export function viewport(canvas, app) {
       if (asked.steps) self.walk(asked.steps);
     } catch (error) { complain(error); } finally { if (self.asked === asked) self.asked = null; }
   }
-  // the ghosts that were under the pointer are elsewhere: the wheel zooms again
+  // forget the ghosts under the pointer after a change: the wheel zooms again
   self.forget = () => {
     if (!self.spot) return;
     Object.assign(self, { stack: [], at: 0, spot: null });
@@ -505,7 +505,7 @@ export function viewport(canvas, app) {
     app.hint();
   };
 
-  // ---------------------------------------------------------------------------------------------------------- hands
+  // -------------------------------------------------------------------------------------------------------- dragging
   // The light's handle or the chosen ghost, whichever is nearer: ghosts may lie next to the light.
   function under(px, py) {
     const near = app.state.lights.map((_, k) => [k, ...handle(k)]).find(([, x, y]) => Math.hypot(px - x, py - y) < NEAR_PX);
@@ -515,7 +515,7 @@ export function viewport(canvas, app) {
   const local = (event) => { const rect = canvas.getBoundingClientRect(); return [event.clientX - rect.left, event.clientY - rect.top]; };
   canvas.addEventListener('pointerdown', (event) => {
     if (!app.state) return;
-    // neither selecting nor the browser's own dragging begins here
+    // no selection and no browser drag
     event.preventDefault();
     canvas.focus();
     canvas.setPointerCapture(event.pointerId);
@@ -529,7 +529,7 @@ export function viewport(canvas, app) {
     const light = near ? near[0] : app.light;
     if (near) app.chooseLight(light);
     const [lx, ly] = near ? [near[1], near[2]] : lightPage(light);
-    // far away from the handle, the light moves as the hand does
+    // a drag far from the handle moves the light by the same distance
     self.drag = { kind: 'maybe', near: Boolean(near), light, px, py, offX: px - lx, offY: py - ly, group: stroke() };
   });
   canvas.addEventListener('pointermove', (event) => {
@@ -550,7 +550,7 @@ export function viewport(canvas, app) {
     else { self.drag = null; if (event.type === 'pointerup' && drag.kind === 'maybe' && !drag.near) pick(...local(event)); }
     redraw();
   }
-  // a drag that the browser ends keeps what was done so far
+  // a drag ended by the browser keeps its result
   for (const end of ['pointerup', 'pointercancel', 'lostpointercapture']) canvas.addEventListener(end, letGo);
   canvas.addEventListener('dragstart', (event) => event.preventDefault());
   canvas.addEventListener('wheel', (event) => {
@@ -562,7 +562,7 @@ export function viewport(canvas, app) {
     if (near(self.spot) && self.stack.length > 1) { self.walk(step); return; }
     self.zoomBy(Math.exp(-event.deltaY * 0.0015), px, py);
   }, { passive: false });
-  // about a place that stays where it is
+  // zoom about a fixed place
   self.zoomBy = (times, px = half() / 2, py = box().h / 2) => {
     const before = frame();
     const u = (px - before.x) / before.w;

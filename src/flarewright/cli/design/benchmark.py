@@ -1,0 +1,271 @@
+"""`flarewright design benchmark`: the tests of Van Acoleyen 2025, to compare solvers with each other and the thesis."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ...errors import ProjectError
+from ..common import check_place, console, print_json, print_remarks, stop_on_interrupt, write_text
+from .checks import check_color_fitness, check_films, check_fitness, check_time
+from .partial_work import partial_work
+
+if TYPE_CHECKING:
+    from ...design.solvers.pool_search import PoolState
+    from ...design.solvers.solvers import Choice, Limits
+    from ...design.thesis.figures import Run
+    from ...design.thesis.trials import Name, Trial
+    from ...measure.core.checkpoint import Journal
+    from ...typing import Report
+
+EPILOG = (
+    "Examples:\n\nflarewright design benchmark heliar --angle 5.45 --seeds 10 --time 10\n\n"
+    "flarewright design benchmark canon --time 120 --picture canon.png --json\n\n"
+    "flarewright design benchmark heliar --coatings quarter-wave --solver ours --solver sade --time 30\n\n"
+    "flarewright design benchmark scratch --ghosts 10 --unsigned --time 60\n\n"
+    "flarewright design benchmark heliar --unsigned --solver pools --solver pso --solver sade --report compared.html"
+)
+
+Solvers = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--solver", help="Solver: pools (ours), pso, sade, de, de1220, gaco or cmaes; pso:5x30 is 5 islands of 30 per "
+        "gene. May be repeated to compare.",
+    ),
+]  # fmt: skip
+
+
+def benchmark(
+    case: Annotated[
+        str,
+        typer.Argument(
+            metavar="heliar|canon|scratch", help="Lens whose ghosts are the targets; scratch: random ghosts."
+        ),
+    ],
+    angle_deg: Annotated[float, typer.Option("--angle", help="Yaw and pitch of the light, degrees.")] = 5.45,
+    coatings: Annotated[
+        str | None, typer.Option(help="Find colours instead, by quarter-wave or free films, or up to 2 or 3 films.")
+    ] = None,
+    ghosts: Annotated[int, typer.Option(min=1, max=60, help="Number of random ghosts per seed, for scratch.")] = 5,
+    seeds: Annotated[int, typer.Option(min=1, max=1000, help="Number of seeds, from 0 (default: 1).")] = 1,
+    time_s: Annotated[float | None, typer.Option("--time", help="Seconds per seed (default: 10).")] = None,
+    cpu_s: Annotated[
+        float | None,
+        typer.Option(
+            "--cpu-time", help="Processor seconds per seed of all cores, instead of --time, for a busy computer."
+        ),
+    ] = None,
+    solver: Solvers = None,
+    fitness: Annotated[
+        str | None,
+        typer.Option(
+            help="Fitness of evolutionary solvers: algorithm1 (algorithm2 for colours), as the thesis, or ours."
+        ),
+    ] = None,
+    unsigned: Annotated[
+        bool, typer.Option("--unsigned", help="Use sizes without sign and no brightness, as the thesis.")
+    ] = False,
+    fresnel: Annotated[
+        bool, typer.Option("--fresnel", help="Use the irradiance of bare surfaces too, to recover the lens itself.")
+    ] = False,
+    picture: Annotated[
+        Path | None, typer.Option(help="Write target and result of the last seed side by side, *.png.")
+    ] = None,
+    report: Annotated[Path | None, typer.Option(help="Write tables, charts and pictures as a page, *.html.")] = None,
+    threads: Annotated[
+        int | None, typer.Option(min=1, help="Number of threads, for ours (default: all cores).")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Search lenses or coatings with the ghosts of a known lens, and compare the pictures.
+
+    Finished runs are kept beside the report or picture: after an interruption, the same command continues.
+    """
+    trial = _trial(case, angle_deg, coatings, ghosts, unsigned, fresnel)
+    limits = _limits(time_s, cpu_s)
+    seen = _fitness(fitness, trial)
+    for place, suffix in ((picture, ".png"), (report, ".html")):
+        if place is not None:
+            check_place(place, suffix)
+    import numpy as np
+
+    from ...design.problem.grey_picture import png_bytes
+    from ...design.solvers.solvers import chosen
+    from ...design.thesis.figures import figure_data
+    from ...design.thesis.figures import write_figures as page
+    from ...io.files.atomic_write import write_atomically
+
+    choices = [chosen(text) for text in solver or ["pools"]]
+    inputs = [repr(trial), seeds, [one.label for one in choices], time_s, cpu_s, seen]
+    _register_runs()
+    with (
+        stop_on_interrupt() as asked,
+        partial_work(report or picture, inputs, "run", "runs") as steps,
+        _progress_display() as progress,
+    ):
+        done = _run_all(trial, seeds, choices, limits, seen, threads, progress, asked, steps)
+        cut_off = steps.unfinished = asked()
+    runs = [run for run, _, _ in done]
+    if cut_off:
+        again = "; to resume: the same command" if report or picture else ""
+        print_remarks([f"ended after {len(done)} of {seeds * len(choices)} runs, the last one cut off{again}"])
+    if picture is not None:
+        data = png_bytes(np.concatenate(done[-1][1:], axis=1))
+        write_atomically(picture, lambda temporary: _write(temporary, data))
+        print_remarks([f"wrote {picture}: the target, and what was found"])
+    if report is not None:
+        write_text(report, page(trial, runs, _best_pictures(trial, done)))
+        print_remarks([f"wrote {report}"])
+    if as_json:
+        print_json({"runs": [asdict(run) for run in runs], "figures": figure_data(trial, runs)})
+        return
+    _print(trial, runs)
+
+
+def _trial(case: str, angle_deg: float, coatings: str | None, ghosts: int, unsigned: bool, fresnel: bool) -> Trial:
+    """Return the test of the arguments, checked."""
+    from ...design.thesis.trials import Trial
+
+    name: Name
+    match case:
+        case "heliar" | "canon" | "scratch":
+            name = case
+        case _:
+            raise ProjectError(f"there is no test {case!r}; choose heliar or canon, or scratch")
+    if not 0.0 < angle_deg < 60.0:
+        raise ProjectError(f"--angle {angle_deg:g} is no angle for this test; choose one above 0 and below 60 degrees")
+    if unsigned and fresnel:
+        raise ProjectError("--unsigned excludes the brightness and --fresnel needs it; keep one")
+    if case == "scratch" and (coatings is not None or fresnel):
+        raise ProjectError("scratch has no lens, so neither --coatings nor --fresnel; choose heliar or canon")
+    kind, layers = (None, 1) if coatings is None else check_films(coatings, "--coatings")
+    return Trial(name, angle_deg, ghosts, kind, layers, unsigned, fresnel)
+
+
+def _limits(time_s: float | None, cpu_s: float | None) -> Limits:
+    """Return the time limits of each seed, checked."""
+    from ...design.solvers.solvers import Limits
+
+    if time_s is not None and cpu_s is not None:
+        raise ProjectError("--time and --cpu-time both limit a seed; keep one")
+    if cpu_s is not None:
+        check_time(cpu_s, "--cpu-time")
+        return Limits(None, cpu_s=cpu_s)
+    limits = Limits(10.0 if time_s is None else time_s)
+    check_time(limits.time_s or 0.0)
+    return limits
+
+
+def _fitness(fitness: str | None, trial: Trial) -> str:
+    """Return the fitness of `--fitness`, checked; that of the thesis by default."""
+    if trial.films is not None:
+        return "algorithm2" if fitness is None else check_color_fitness(fitness)
+    return "algorithm1" if fitness is None else check_fitness(fitness)
+
+
+def _run_all(
+    trial: Trial, seeds: int, choices: Sequence[Choice], limits: Limits, seen: Any, threads: int | None,
+    progress: Report | None, cancelled: Callable[[], bool], steps: Journal,
+) -> list[tuple[Run, Any, Any]]:  # fmt: skip
+    """Run every solver with every seed, until Ctrl-C, or return the recorded runs."""
+    from ...design.thesis.benchmark import run_trial
+    from ...design.thesis.benchmark_colors import run_colors
+
+    run_one: Any = run_trial if trial.films is None else run_colors
+    done: list[tuple[Run, Any, Any]] = []
+    for choice in choices:
+        for seed in range(seeds):
+            if done and cancelled():
+                return done
+
+            def show(now: PoolState, choice: Choice = choice, seed: int = seed) -> None:
+                if progress is not None:
+                    progress(f"{choice.label}, seed {seed}: {now.searches} {choice.unit}")
+
+            one = replace(limits, progress=show, cancelled=cancelled)
+            run = partial(run_one, trial, seed=seed, limits=one, choice=choice, measure=seen, threads=threads)
+            done.append(steps.step(run, cancelled))
+    return done
+
+
+def _register_runs() -> None:
+    """Let a journal hold finished runs."""
+    from ...design.thesis.benchmark import BenchmarkRun, TracePoint
+    from ...design.thesis.benchmark_colors import ColorPoint, ColorRun
+    from ...measure.core.checkpoint import recorded
+
+    for record in (BenchmarkRun, TracePoint, ColorRun, ColorPoint):
+        recorded(record)
+
+
+def _best_pictures(trial: Trial, done: Sequence[tuple[Run, Any, Any]]) -> list[tuple[str, Any]]:
+    """Return the target and each solver's best picture; for random ghosts, each beside its target."""
+    from ...design.thesis.benchmark import BenchmarkRun
+
+    best = {}
+    for run, target, found in sorted(done, key=lambda one: one[0].psnr_db):
+        ssim = f", SSIM {run.ssim:.4f}" if isinstance(run, BenchmarkRun) else ""
+        words = f"{run.solver}, seed {run.seed}: {run.psnr_db:.2f} dB{ssim}"
+        best[run.solver] = [(f"target of seed {run.seed}", target), (words, found)]
+    if trial.name == "scratch":
+        return [one for both in best.values() for one in both]
+    return [("target", done[0][1]), *(both[1] for both in best.values())]
+
+
+def _print(trial: Trial, runs: Sequence[Run]) -> None:
+    from rich.table import Table
+
+    from ...design.thesis.benchmark import BenchmarkRun
+    from ...design.thesis.figures import comparison, head, side_by_side_charts, solvers_of
+
+    reported, several = side_by_side_charts(trial), len(solvers_of(runs)) > 1
+    out = Table(title=f"{trial.title}{' · ' if reported else ''}{reported}")
+    unit = "searches" if solvers_of(runs) in (("pools",), ("ours",)) else "evaluations"
+    for column in (*(("solver",) if several else ()), "seed", "seconds", "CPU s", unit,
+                   *(one.title for one in trial.measures), "black dB",
+                   *(("with gain dB",) if trial.films is None else ()), "the same"):  # fmt: skip
+        out.add_column(column, justify="right", no_wrap=True)
+    for run in runs:
+        measured = (_figure(one.key, getattr(run, one.key)) for one in trial.measures)
+        out.add_row(
+            *((run.solver,) if several else ()), str(run.seed), f"{run.seconds:.1f}", f"{run.cpu_seconds:.1f}",
+            str(run.searches), *measured, f"{run.psnr_black_db:.1f}",
+            *((f"{run.psnr_gain_db:.1f}",) if isinstance(run, BenchmarkRun) else ()),
+            "yes" if run.recovered else "no",
+        )  # fmt: skip
+    console().print(out)
+    if several:
+        beside_each_other = Table(title="side by side: medians over the seeds, and the best of them")
+        for column in head(trial):
+            beside_each_other.add_column(column, justify="right", no_wrap=True)
+        for row in comparison(trial, runs):
+            beside_each_other.add_row(*row)
+        console().print(beside_each_other)
+
+
+def _figure(key: str, value: float) -> str:
+    return f"{value:.1f}" if key == "psnr_db" else (f"{value:.4f}" if key == "ssim" else f"{value:.3g}")
+
+
+@contextmanager
+def _progress_display() -> Iterator[Report | None]:
+    """Show the present run on a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.status import Status
+
+    with Status("searching", console=Console(stderr=True)) as status:
+        yield status.update
+
+
+def _write(path: Path, data: bytes) -> None:
+    path.write_bytes(data)

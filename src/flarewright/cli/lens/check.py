@@ -1,0 +1,73 @@
+"""`flarewright lens check`: whether lens files can be used."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated, Any
+
+import typer
+
+from ...errors import FlarewrightError, naming
+from ..common import APERTURES_HELP, aperture_reading, error_data, print_json
+
+EPILOG = "Example:\n\nflarewright lens check my-lenses/*.lens"
+
+
+def check(
+    files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Lens files or shipped names.")],
+    apertures: Annotated[str | None, typer.Option(metavar="KIND", help=APERTURES_HELP)] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Check lens files and list repairs; exit code 2 if any is rejected."""
+    from ...io.files.door import sentences_for
+    from ...io.images.mask_image import read_mask
+    from ...render.scene.resolve import first_order, open_lens
+
+    reading = aperture_reading(apertures)
+    results: list[dict[str, Any]] = []
+    for file in files:
+        try:
+            # one file's fault never ends the check of the others
+            with sentences_for(file, "a lens"):
+                opened = open_lens(file, apertures=reading)
+                lens = opened.lens
+                order = first_order(lens)
+                if lens.iris.mask is not None:
+                    with naming(file):
+                        read_mask(lens.iris.mask)
+        except FlarewrightError as error:
+            results.append(error_data(file, error))
+            continue
+        results.append(
+            {
+                "file": file,
+                "usable": True,
+                "name": lens.name,
+                "efl_mm": order.efl,
+                "f_number": lens.f_number,
+                "remarks": opened.remarks,
+            }
+        )
+    if as_json:
+        print_json({"files": results})
+    else:
+        _print(results)
+    refused = sum(not result["usable"] for result in results)
+    if refused:
+        what = results[0]["reason"] if len(results) == 1 else f"{refused} of {len(results)} lens files were rejected"
+        print(f"flarewright: error: {what}", file=sys.stderr)
+        raise typer.Exit(2)
+
+
+def _print(results: list[dict[str, Any]]) -> None:
+    for result in results:
+        if result["usable"]:
+            print(
+                f"{result['file']}: usable, {result['name']}, efl {result['efl_mm']:.2f} mm, f/{result['f_number']:g}"
+            )
+            findings = result["remarks"]
+        else:
+            print(f"{result['file']}: rejected, {result['reason']}")
+            findings = result["problems"] if len(result["problems"]) > 1 else []
+        for finding in findings:
+            print(f"  - {finding}")

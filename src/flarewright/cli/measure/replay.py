@@ -1,0 +1,76 @@
+"""`flarewright measure replay`: a measured flare at any constellation and roll."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ...errors import FlarewrightError
+from ..common import check_place, picture_size, print_json, print_remarks
+
+EPILOG = "Example:\n\nflarewright measure replay model.json --constellation 12.3 --roll 30 -o flare.exr"
+
+
+def replay(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="A ghost model of `measure run`.")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT.exr", help="The picture to write.")],
+    constellation: Annotated[float | None, typer.Option(help="Degrees between the optical axis and the light.")] = None,
+    roll: Annotated[
+        float | None, typer.Option(help="Direction of the light, degrees counterclockwise from the right (0).")
+    ] = None,
+    camera: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="JSON: camera and light in space, f-number, ISO, exposure (docs/ghost-model.md)."
+        ),
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(metavar="WxH", help="Picture in pixels (default: that of the captures).")
+    ] = (None),
+    single: Annotated[bool, typer.Option("--ghosts", help="Also write a layer for each ghost.")] = False,
+    rec709: Annotated[
+        bool,
+        typer.Option("--rec709", help="Convert to linear Rec.709 by the camera's matrix (default: camera colours)."),
+    ] = False,
+    full: Annotated[bool, typer.Option("--float", help="Write 32 bits per value, unscaled irradiances.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Render a measured flare as layers of an EXR file."""
+    check_place(output, ".exr")
+    from ...io.files.sentences import count
+    from ...io.images.exr import write_exr
+    from ...io.images.half import half_scale
+    from ...io.measurement.ghost_model_file import read_ghost_model, read_replay_camera
+    from ...measure.replay.model_image import replay_model as draw
+    from ...measure.replay.placement import brightness_gain, constellation_and_roll
+    from ...model.measurement.replay_camera import ReplayCamera
+
+    known = read_ghost_model(model)
+    shot = ReplayCamera() if camera is None else read_replay_camera(camera)
+    if shot.light is not None:
+        if constellation is not None or roll is not None:
+            raise FlarewrightError("the camera file places the light; omit --constellation and --roll")
+        constellation, roll = constellation_and_roll(shot.position, shot.forward, shot.up, shot.light)
+    if constellation is None:
+        raise FlarewrightError("no place of the light; give --constellation DEG, or a --camera file with a light")
+    pixels = picture_size(size) if size is not None else shot.size_px or known.size_px
+    gain = brightness_gain(known.reference, shot)
+    layers = draw(known, constellation, roll_deg=roll or 0.0, size_px=pixels, gain=gain, single=single,
+                  colors="rec709" if rec709 else "camera")  # fmt: skip
+    metadata = {"model": model.name, "constellation_deg": f"{constellation:.9g}", "roll_deg": f"{roll or 0.0:.9g}"}
+    # the gain stands for the light's strength, as the intensity does in `render`
+    scale = 1.0 if full else half_scale(gain)
+    print_remarks(
+        write_exr(output, layers, pixels, pixel_type="float" if full else "half", scale=scale, metadata=metadata)
+    )
+    facts = {
+        "output": str(output), "constellation_deg": constellation, "roll_deg": roll or 0.0, "brightness": gain,
+        "size_px": list(pixels), "layers": [layer.name for layer in layers], "scale": scale,
+    }  # fmt: skip
+    if as_json:
+        print_json(facts)
+    else:
+        place = f"{constellation:.4g} degrees, roll {roll or 0.0:.4g}"
+        print(f"{output}: {count(len(layers), 'layer')}, {place}, brightness {gain:.4g}")

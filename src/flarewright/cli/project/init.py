@@ -1,0 +1,72 @@
+"""`flarewright project init`: write a new project file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..common import check_free, check_place, field_angles, print_remarks, write_text
+
+if TYPE_CHECKING:
+    from ...model import Light, Project
+
+EPILOG = (
+    "Example:\n\nflarewright project init heliar-tronnier -o shot.toml\n\n"
+    "flarewright render --project shot.toml -o shot.exr"
+)
+
+
+def init(
+    lens: Annotated[str, typer.Argument(metavar="LENS", help="A shipped lens, a lens file, or a measured flare.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="The project file, *.toml (default: stdout).")
+    ] = None,
+    light: Annotated[str, typer.Option(metavar="X,Y", help="The first light, degrees right and up.")] = "10,5",
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+) -> None:
+    """Write a project file with every setting, its default and a comment."""
+    angles = field_angles(light)
+    if output is not None:
+        check_place(output, ".toml")
+        check_free(output, force)
+    from ...io.measurement.ghost_model_file import is_ghost_model_file
+    from ...io.project.project_file import project_text
+    from ...model import Light
+
+    here = Light(field_deg=angles)
+    project, remarks = (_measured(lens, here), ()) if is_ghost_model_file(lens) else _of_lens(lens, here)
+    text = project_text(project, folder=output.parent if output else None, comments=True)
+    if output is None:
+        print(text, end="")
+        return
+    write_text(output, text)
+    print_remarks([*remarks, f"wrote {output}"])
+
+
+def _of_lens(lens: str, light: Light) -> tuple[Project, tuple[str, ...]]:
+    """Return a project with a lens, and remarks on the lens."""
+    from ...io.lens.library import library_names
+    from ...model import Project
+    from ...render.scene.resolve import open_lens
+
+    opened = open_lens(lens)
+    found = opened.path
+    assert found is not None
+    # A shipped lens keeps its name; a file gets a path relative to the project's folder.
+    ships = found.stem in library_names() and not Path(lens).exists()
+    name = found.stem if ships else os.fspath(found)
+    return Project(lens=name, lights=(light,), iris=opened.lens.iris), opened.remarks
+
+
+def _measured(path: str, light: Light) -> Project:
+    """Return a project with the whole frame of the captures."""
+    from ...measure.replay.measured_project import check_measured, flare_of, with_sensor
+    from ...model import Camera, Project
+
+    project = Project(lens=path, lights=(light,))
+    shown = with_sensor(project.replace(camera=Camera(size_px=flare_of(project).model.size_px)))
+    check_measured(shown)
+    return shown

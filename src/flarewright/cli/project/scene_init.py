@@ -1,0 +1,30 @@
+"""`flarewright scene init`: write a new scene file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..common import check_free, check_place, print_remarks, write_text
+
+EPILOG = "Example:\n\nflarewright scene init -o match.toml\n\nflarewright predict match.toml -o match.html"
+
+
+def init(
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="The scene file, *.toml (default: stdout).")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+) -> None:
+    """Write a scene with two cameras, the sun and a lamp, and a comment on every key."""
+    from ...io.project.scene_file import EXAMPLE
+
+    if output is None:
+        print(EXAMPLE, end="")
+        return
+    check_place(output, ".toml")
+    check_free(output, force)
+    write_text(output, EXAMPLE)
+    print_remarks([f"wrote {output}"])

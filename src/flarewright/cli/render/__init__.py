@@ -1,0 +1,10 @@
+"""Commands `flarewright render` and `flarewright ghosts`.
+
+- `command`: `render`, and the files written
+- `options`: the options of `render`, a record for each section of the help page
+- `project_flags`: `build_project` converts options to a project
+- `look_flags`: `--look`, and photographic defaults of library lenses
+- `art_flags`: options for overrides: `--rule`, `--solo`, `--mute`, `--gain`, `--physical`
+- `preview`: the PNG: options, exposure, file
+- `ghosts_command`: `ghosts`, the ghost analysis of a lens
+"""

@@ -1,0 +1,251 @@
+"""`flarewright render`: render the flare of a lens and a light as a layered, linear picture."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...errors import ProjectError
+from ..common import check_place, first_run_bar, one_bar, print_json, print_remarks
+from ..option_record import with_options
+from .options.record import RenderOptions
+from .preview import PreviewLook, check_exposure, preview_look, write_preview
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ...model import Project
+    from ...model.project.reference_state import ReferenceState
+    from ...render.reference.energy_ledger import Ledger
+    from ...render.reference.estimator import ReferenceRun
+    from ...render.render import Rendering
+
+EPILOG = (
+    "Examples:\n\nflarewright render heliar-tronnier --light 10,5 -o flare.exr\n\n"
+    "flarewright render canon-28-80 --light -8,3 --light 2,6 --intensity 1 --intensity 0.2 --spectrum black-body:3200 "
+    "--fstop 8 --blades 7 --coating quarter-wave:550 --size 1920x1080 --layers ghosts --brightest 30 "
+    "-o shot.exr\n\n"
+    "flarewright render heliar-tronnier --light sun@10,5 --light -12,2 --light-size 3x2 --distance inf --distance 900 "
+    "--spectrum d65 --spectrum rgb:1,0.6,0.2 -o room.exr\n\n"
+    "flarewright render model.json --light 12,7 --mute 3 -o measured.exr\n\n"
+    "flarewright render --project shot.toml --quality draft -o test.exr"
+)
+
+
+@with_options(RenderOptions)
+def render(options: RenderOptions) -> None:
+    """Render the flare of a lens into a layered, linear EXR, with a PNG preview.
+
+    Every value is an irradiance on the sensor relative to a light of irradiance 1, so layers add up to the beauty.
+    A file of half floats holds the value times a power of two, its attribute flarewright.scale.
+    """
+    check_place(options.output, ".exr")
+    view_of = preview_look(
+        view=options.view,
+        exposure=options.exposure,
+        ev=options.ev,
+        shutter=options.shutter,
+        iso=options.iso,
+        lux=options.lux,
+        no_png=options.no_png,
+    )
+    state = _read_state(options.resume)
+    flags, settings, remarks = _settings(options, state)
+    check_exposure(view_of, settings)
+    run = _reference_run(options, settings, state)
+    _keep_inputs(
+        settings,
+        options.project,
+        [options.output] if options.no_png else [options.output, options.output.with_suffix(".png")],
+    )
+    from .art_flags import naming_rules
+
+    try:
+        with naming_rules(flags, settings):
+            rendering = _render(settings, options.threads, run, options.ledger)
+    except KeyboardInterrupt:
+        if run is not None and run.state_file is not None and run.state_file.exists():
+            print_remarks([f"to resume: flarewright render --resume {run.state_file} -o {options.output}"])
+        raise
+    files, written = _write(rendering, options.output, options.full_windows, view_of)
+    remarks = [*_without_effect(options, settings), *remarks, *rendering.remarks, *written]
+    if run is not None and run.state_file is not None and run.state_file.exists():
+        remarks.append(f"to reach a smaller --error: --resume {run.state_file}")
+    print_remarks(remarks)
+    if rendering.ledger is not None:
+        _print_ledger(rendering.ledger)
+    if options.as_json:
+        print_json({**rendering.summary, **files, "remarks": remarks})
+    else:
+        print_remarks(f"wrote {name}" for name in (files["output"], files.get("preview")) if name)
+
+
+def _settings(options: RenderOptions, state: ReferenceState | None) -> tuple[RenderOptions, Project, list[str]]:
+    """Build the project that the options ask for; return them with their look, the project and remarks."""
+    if options.half and options.float32:
+        raise ProjectError("--half and --float both set the bits per value; keep one")
+    from .look_flags import photographed, put_look, settings_of
+    from .project_flags import build_project
+
+    flags = replace(options, resumed=None if state is None else state.project)
+    given, plain = settings_of(flags), options.ideal or options.project is not None or state is not None
+    remarks: list[str] = []
+    if options.look is not None:
+        flags, of_look, unfit = put_look(flags, options.look)
+        given, remarks = given | of_look, list(unfit)
+    settings = build_project(flags)
+    if not plain:
+        settings, filled = photographed(settings, given)
+        remarks = [*filled, *remarks]
+    return flags, settings, remarks
+
+
+def _without_effect(options: RenderOptions, settings: Project) -> list[str]:
+    """Return a remark for each option that has no effect on this project."""
+    remarks = []
+    if options.order4_limit is not None and settings.quality.orders != 4:
+        remarks.append("--order4-limit has no effect without ghosts of four reflections: add --orders 4")
+    if options.full_windows and settings.output.layers != "ghosts":
+        remarks.append("--full-windows has no effect without layers of single ghosts: add --layers ghosts")
+    if options.brightest is not None and settings.output.layers != "ghosts":
+        remarks.append("--brightest has no effect without layers of single ghosts: add --layers ghosts")
+    if options.orders == 4 and settings.quality.mode == "draft":
+        remarks.append("draft quality draws ghosts of two reflections only: --orders 4 is for final quality")
+    if options.ringing == "collins" and settings.quality.mode != "final":
+        remarks.append(f"{settings.quality.mode} quality has no rings: --ringing is for final quality")
+    moving = [k for k, light in enumerate(settings.lights) if light.keyframes]
+    if moving:
+        which = f"light{'s'[: len(moving) > 1]} {', '.join(map(str, moving))}"
+        remarks.append(
+            f"one frame is drawn, at field_deg; the keyframes of {which} are left out: flarewright edit plays the path"
+        )
+    return remarks
+
+
+def _keep_inputs(settings: Project, project_file: Path | None, outputs: list[Path]) -> None:
+    """Raise an error if an output would replace an input file."""
+    read = [project_file, settings.lens if isinstance(settings.lens, str) else None]
+    read += [settings.iris.mask if settings.iris is not None else None, settings.dirt.image]
+    for hiding in (settings.holdout, *(light.holdout for light in settings.lights)):
+        read += [] if hiding is None else [hiding.image, hiding.depth]
+    for source in read:
+        for output in outputs:
+            if source is not None and Path(source).exists() and output.exists() and output.samefile(source):
+                raise ProjectError(f"{output} would replace an input file; choose another name for -o")
+
+
+def _read_state(path: Path | None) -> ReferenceState | None:
+    if path is None:
+        return None
+    from ...io.render_state.reference_state import read_state
+
+    return read_state(path)
+
+
+def _reference_run(options: RenderOptions, project: Project, state: ReferenceState | None) -> ReferenceRun | None:
+    """Check the options of reference quality; None for the other qualities."""
+    time_limit = options.time_limit
+    if time_limit is not None and not 0.0 < time_limit < float("inf"):
+        raise ProjectError(f"--time-limit {time_limit:g} is no time; give seconds above 0")
+    if project.quality.mode != "reference":
+        given = {
+            "--resume": state, "--time-limit": time_limit, "--error": options.error, "--error-of": options.error_of,
+            "--samples": options.samples, "--rays-from": options.rays_from,
+        }  # fmt: skip
+        for flag in (flag for flag, value in given.items() if value is not None):
+            raise ProjectError(
+                f"{flag} works with --quality reference only, not with {project.quality.mode}; add it or omit {flag}"
+            )
+        return None
+    from ...io.render_state.reference_state import SUFFIX
+    from ...render.reference.estimator import ReferenceRun
+
+    output = options.output
+    return ReferenceRun(state, output.with_name(output.stem + SUFFIX), time_limit)
+
+
+def _print_ledger(ledger: Ledger) -> None:
+    """Print the ledger as a table to stderr."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=f"Where the light went: {ledger.entered_mm2:.6g} mm² entered")
+    table.add_column("light")
+    table.add_column("share of the light", justify="right")
+    table.add_column("standard error", justify="right")
+    for line in ledger.lines:
+        table.add_row(line.words, f"{line.share:.6%}", f"{line.standard_error:.1e}")
+    table.add_section()
+    table.add_row("sum", f"{ledger.total.share:.6%}", f"{ledger.total.standard_error:.1e}")
+    Console(stderr=True, markup=False, highlight=False).print(table)
+
+
+def _render(project: Project, threads: int | None, run: ReferenceRun | None, ledger: bool) -> Rendering:
+    """Render with a progress bar on a terminal."""
+    draw = _renderer(project, threads, run, ledger)
+    with one_bar("rendering") as progress:
+        return draw(progress=progress)
+
+
+def _renderer(
+    project: Project, threads: int | None, run: ReferenceRun | None, ledger: bool
+) -> Callable[..., Rendering]:  # fmt: skip
+    """Return the render function of a project, of a lens or of a measured flare; it takes a progress callback."""
+    from functools import partial
+
+    from ...io.measurement.ghost_model_file import is_ghost_model_file
+
+    if is_ghost_model_file(project.lens):
+        from ...measure.replay.measured_project import render_measured
+
+        if ledger:
+            raise ProjectError(f"{project.lens} is a measured flare, which has no ledger; omit --ledger")
+        return partial(render_measured, project)
+    from ...render.render import render as render_project
+    from ...render.warmup import compile_for_render
+
+    compile_for_render(project, threads, lambda sentence: print_remarks([sentence]), first_run_bar)
+    return partial(render_project, project, threads=threads, run=run, ledger=ledger)
+
+
+def _write(
+    rendering: Rendering, output: Path, full_windows: bool, look: PreviewLook | None
+) -> tuple[dict[str, Any], list[str]]:
+    """Write the EXR and its preview; return the files by kind, and remarks."""
+    from ... import __version__
+    from ...io.images.exr import write_exr
+    from ...io.images.half import exr_scale
+    from ...io.project.project_file import project_text
+    from ...render.image.gamut import negative_share
+
+    project = rendering.project
+    width, height = project.camera.size_px
+    scale = exr_scale(project)
+    remarks = list(
+        write_exr(
+            output,
+            rendering.layers,
+            (width, height),
+            pixel_type=project.output.pixel_type,
+            scale=scale,
+            metadata={"version": __version__, "project": project_text(project)},
+            pixel_aspect=project.camera.pixel_aspect,
+            colorspace=project.output.colorspace,
+            full_windows=full_windows,
+        )
+    )
+    outside = negative_share(rendering.layers[0])
+    if outside > 0.0:
+        remarks.append(
+            f"{round(outside * width * height)} of {width * height} pixels have a negative channel: colours outside "
+            "the file's primaries; --gamut compress writes none"
+        )
+    files: dict[str, Any] = {
+        "output": str(output), "layers": [layer.name for layer in rendering.layers], "scale": scale,
+        "negative_pixels": outside,
+    }  # fmt: skip
+    if look is not None:
+        files |= write_preview(rendering, output.with_suffix(".png"), look)
+        remarks.append(f"the preview shows {files['view']}")
+    return files, remarks

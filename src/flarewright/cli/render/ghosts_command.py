@@ -1,0 +1,225 @@
+"""`flarewright ghosts`: the ghost analysis of a lens."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ...errors import ProjectError
+from ..common import chosen_fstop, console, field_angles, first_run_bar, print_json, print_remarks
+from ..option_record import with_options
+
+if TYPE_CHECKING:
+    from ...model import Lens, Project
+    from ...optics.rays.ghost_table import GhostRow, GhostTable
+
+EPILOG = (
+    "Examples:\n\nflarewright ghosts heliar-tronnier --light 10,0\n\n"
+    "flarewright ghosts my.toml --light 0,0 --coating quarter-wave:550 --fstop 8 --json"
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GhostsOptions:
+    """The options of `flarewright ghosts` as given."""
+
+    lens: Annotated[str, typer.Argument(metavar="LENS", help="A shipped lens (flarewright lenses) or a lens file.")]
+    light: Annotated[
+        list[str], typer.Option(metavar="X,Y", help="Field angles in degrees, right and up in the picture.")
+    ]
+    distance: Annotated[
+        float | None, typer.Option(help="Distance of the light in front of the lens, mm (default: inf).")
+    ] = None
+    wavelength_nm: Annotated[float, typer.Option(help="Wavelength, 380 to 780 nm (default: 587.56).")] = 587.56
+    coating: Annotated[
+        str,
+        typer.Option(
+            help="lens, none, quarter-wave:NM, preset:NAME, a name of `flarewright coating list`, stack:N:NM,... "
+            "or a file."
+        ),
+    ] = "lens"
+    fstop: Annotated[float | None, typer.Option(help="f-number (default: wide open).")] = None
+    paths: Annotated[str, typer.Option(help="Ghost paths: all, or same-side of the stop.")] = "all"
+    focus: Annotated[float | None, typer.Option(help="Distance of the plane in focus, mm (default: infinity).")] = None
+    sensor_distance: Annotated[float | None, typer.Option(help="Last vertex to sensor, mm.")] = None
+    zoom: Annotated[
+        str | None, typer.Option(metavar="MM|NAME", help="Focal length, or a position of the lens file.")
+    ] = None
+    filter_plate: Annotated[
+        str | None, typer.Option("--filter", metavar="GLASS:MM[:GAP]", help="Plane filter in front: N-BK7:2.")
+    ] = None
+    cover_glass: Annotated[
+        str | None, typer.Option(metavar="GLASS:MM[:GAP]", help="Plane glass in front of the sensor: N-BK7:2:0.5.")
+    ] = None
+    sensor_reflectance: Annotated[float, typer.Option(help="Reflectance of the sensor, 0 to 1 (default: 0).")] = 0.0
+    imperfection: Annotated[
+        str | None,
+        typer.Option(metavar="SEED[:UM:ARCMIN[:NM]]", help="Random sample of the lens within tolerances."),
+    ] = None
+    orders: Annotated[int, typer.Option(help="Reflections: 4 also lists ghosts of four (default: 2).")] = 2
+    order4_limit: Annotated[
+        float, typer.Option(help="List those above this fraction of the two-reflection light (default: 1e-4).")
+    ] = 1e-4
+    glare: Annotated[bool, typer.Option("--glare", help="Also print the veiling glare index.")] = False
+    scatter: Annotated[
+        str | None, typer.Option(metavar="MODEL", help="For --glare: none, harvey-shack, abg, chaumond.")
+    ] = None
+    surface_roughness: Annotated[float | None, typer.Option(help="For --glare: rms roughness of the surfaces, nm.")] = (
+        None
+    )
+    cleanliness: Annotated[float | None, typer.Option(help="For --glare: dust, level of IEST-STD-CC1246.")] = None
+    brightest: Annotated[int | None, typer.Option(min=1, help="List only the brightest ones, up to this number.")] = (
+        None
+    )
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False
+
+
+@with_options(GhostsOptions)
+def ghosts(options: GhostsOptions) -> None:
+    """List flux and place of every two-reflection ghost path, and on request of those of four reflections.
+
+    Rays are traced, not paraxial, to the unbounded sensor plane. The throughput is the flux on it for a light with an
+    irradiance of 1 on a plane facing it; the peak irradiance is relative to the direct image's flux.
+    """
+    # the flags are checked before anything slow is imported
+    project_with = _project_of(options)
+
+    from ...optics.rays.ghost_table import GhostQuery
+    from ...optics.rays.pack import SensorMirror
+    from ...render.analysis import find_ghosts
+    from ...render.scene.resolve import open_lens, resolve_project
+    from ...render.warmup import compile_for_analysis
+    from .project_flags import check_focus
+
+    opened = open_lens(options.lens)
+    check_focus(opened.lens, options.focus, options.sensor_distance)
+    project = project_with(opened.lens)
+    settled = resolve_project(project)
+    compile_for_analysis(settled.lens, first_run_bar)
+    light, quality, reflectance = project.lights[0], project.quality, options.sensor_reflectance
+    query = GhostQuery(
+        light.field_deg, light.distance, options.wavelength_nm, quality.paths,
+        SensorMirror(reflectance) if reflectance > 0.0 else None, quality.orders, quality.order4_limit,
+    )  # fmt: skip
+    table, found = find_ghosts(settled.lens, settled.order, settled.coating, query)
+    veil = None
+    if options.glare:
+        from ...render.scattering.veiling_glare import veiling_glare
+
+        veil = veiling_glare(project, options.wavelength_nm)
+    print_remarks(dict.fromkeys((*opened.remarks, *settled.remarks, *found)))
+    if options.as_json:
+        print_json(ghost_data(table, options.brightest) | ({} if veil is None else {"veiling_glare": asdict(veil)}))
+        return
+    _print_table(table, opened.lens.name, light.field_deg, options.brightest)
+    if veil is not None:
+        console().print(
+            f"veiling glare index {veil.index:.3%} at {veil.wavelength_nm:g} nm: ghosts {veil.ghosts:.3%}, scatter "
+            f"{veil.scatter:.3%}, blur {veil.blur:.3%}; a black patch of {veil.patch_deg:.2f} degrees"
+        )
+
+
+def _project_of(options: GhostsOptions) -> Callable[[Lens], Project]:
+    """Check the options; return a function that makes the project of the opened lens."""
+    from ...io.lens.coating_text import parse_coating_choice
+    from ...io.lens.plate_text import parse_imperfection, parse_plate
+    from .project_flags import project_of, scatter_flags
+
+    if len(options.light) > 1:
+        raise ProjectError(f"--light is given {len(options.light)} times; ghosts are listed for one light, so keep one")
+    angles, wavelength_nm = field_angles(options.light[0]), options.wavelength_nm
+    if not (math.isfinite(wavelength_nm) and 380.0 <= wavelength_nm <= 780.0):
+        raise ProjectError(f"--wavelength-nm {wavelength_nm:g} is not visible light; choose one between 380 and 780 nm")
+    in_front, behind, imperfection = options.filter_plate, options.cover_glass, options.imperfection
+    settings = {
+        "coating": parse_coating_choice(options.coating),
+        "f_number": chosen_fstop(options.fstop),
+        "filter": None if in_front is None else parse_plate(in_front, "--filter"),
+        "camera": {
+            "cover_glass": None if behind is None else parse_plate(behind, "--cover-glass"),
+            "sensor_reflectance": options.sensor_reflectance,
+            "focus_distance": options.focus,
+            "sensor_distance": options.sensor_distance,
+        },
+        "imperfection": None if imperfection is None else parse_imperfection(imperfection),
+        "scatter": scatter_flags(options.scatter, options.surface_roughness, options.cleanliness),
+        "lights": ({"field_deg": angles, "distance": None if options.distance == math.inf else options.distance},),
+        "quality": {"paths": options.paths, "orders": options.orders, "order4_limit": options.order4_limit},
+        "zoom": options.zoom,
+    }
+    if settings["scatter"] is not None and not options.glare:
+        raise ProjectError("--scatter, --surface-roughness and --cleanliness change the glare only; add --glare")
+    return lambda lens: project_of({"lens": lens, **settings})
+
+
+def ghost_data(table: GhostTable, brightest: int | None = None) -> dict[str, Any]:
+    """Return the analysis as the JSON that `--json` prints."""
+    return {
+        "efl_mm": table.efl,
+        "bfl_mm": table.bfl,
+        "f_number": table.f_number,
+        "entrance_pupil_diameter_mm": table.entrance_pupil_diameter,
+        "stop_semi_diameter_mm": table.stop_semi_diameter,
+        "sensor_distance_mm": table.sensor_distance,
+        "direct": {
+            "throughput_mm2": table.direct.throughput_mm2,
+            "centroid_mm": list(table.direct.centroid_mm),
+            "rms_radius_mm": table.direct.rms_radius_mm,
+        },
+        "ghosts": [
+            {
+                "first_reflection": row.first_reflection,
+                "second_reflection": row.second_reflection,
+                **({"later_reflections": list(row.later_reflections)} if row.later_reflections else {}),
+                "throughput_mm2": row.throughput_mm2,
+                "centroid_mm": list(row.centroid_mm),
+                "rms_radius_mm": row.rms_radius_mm,
+                "peak_irradiance": row.peak_irradiance,
+                "peak_patch_mm": row.peak_patch_mm,
+                "bounded_by": row.bounded_by,
+                "focus_distance_mm": row.focus_distance_mm,
+            }
+            for row in table.ghosts[:brightest]
+        ],
+    }
+
+
+def _print_table(table: GhostTable, name: str, angles: tuple[float, float], brightest: int | None) -> None:
+    from rich.table import Table
+
+    out = Table(
+        title=f"{name} · f/{table.f_number:g} · efl {table.efl:.2f} mm · light at {angles[0]:g}, {angles[1]:g} degrees",
+        caption="Peak: brightest irradiance over the direct image's flux, 1/mm². Focus: mm behind the sensor.",
+    )
+    out.add_column("path", no_wrap=True)
+    for column in ("throughput mm²", "of direct", "centroid mm", "rms radius mm", "peak 1/mm²"):
+        out.add_column(column, justify="right", no_wrap=True)
+    out.add_column("bounded by", no_wrap=True)
+    out.add_column("focus mm", justify="right", no_wrap=True)
+    direct = table.direct
+    out.add_row("direct", *_cells(direct, direct), end_section=True)
+    for row in table.ghosts[:brightest]:
+        out.add_row(row.name, *_cells(row, direct))
+    console().print(out)
+
+
+def _cells(row: GhostRow, direct: GhostRow) -> tuple[str, ...]:
+    if row.throughput_mm2 == 0.0:
+        return ("0", "-", "-", "-", "-", row.bounded_by, "-")
+    ghost = row.first_reflection is not None
+    # a light without a direct image may still make ghosts
+    compared = ghost and direct.throughput_mm2 > 0.0
+    return (
+        f"{row.throughput_mm2:.4g}",
+        f"{row.throughput_mm2 / direct.throughput_mm2:.2e}" if compared else "-" if ghost else "1",
+        # z: print -0.00 as 0.00
+        f"{row.centroid_mm[0]:z.2f}, {row.centroid_mm[1]:z.2f}",
+        f"{row.rms_radius_mm:.3g}",
+        f"{row.peak_irradiance:.3g}" if compared else "-",
+        row.bounded_by if ghost else "-",
+        "-" if row.focus_distance_mm is None or not ghost else f"{row.focus_distance_mm:.1f}",
+    )

@@ -1,0 +1,13 @@
+"""The options of `flarewright render`, a record for each section of its help page.
+
+- `light`: the lights, and what hides them
+- `lens`: the lens: aperture, iris, coating, scatter, zoom, filters
+- `camera`: the sensor and the picture
+- `quality`: how the picture is computed
+- `art`: overrides of the artist
+- `output`: what is written, and how the PNG shows it
+- `reference`: reference quality: errors, samples, time
+- `starburst`: dirt in the pupil and its effect on the starburst
+- `inputs`: what is rendered: a lens or a measured flare, a project, a look
+- `record`: `RenderOptions`, all of them together
+"""

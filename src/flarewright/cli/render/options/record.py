@@ -1,0 +1,34 @@
+"""All options of `flarewright render`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from .art import ArtOptions
+from .camera import CameraOptions
+from .inputs import InputOptions
+from .lens import LensOptions
+from .light import LightOptions
+from .output import OutputOptions
+from .quality import QualityOptions
+from .reference import ReferenceOptions
+from .starburst import StarburstOptions
+
+
+@dataclass(frozen=True, kw_only=True)
+class RenderOptions(
+    ReferenceOptions,
+    QualityOptions,
+    CameraOptions,
+    ArtOptions,
+    StarburstOptions,
+    LensOptions,
+    LightOptions,
+    InputOptions,
+    OutputOptions,
+):
+    """The options as given; the last base comes first on the help page."""
+
+    resumed: Any = None
+    """The `Project` of a picture that resumes, or one that a look has made; help does not load its type."""

@@ -1,0 +1,403 @@
+"""Conversion of the flags of `flarewright render` to a project."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from ...errors import ProjectError
+from ...io.lens.coating_text import parse_coating_choice
+from ...io.lens.plate_text import parse_grating, parse_imperfection, parse_plate
+from ...io.project.project_file import ProjectFileError, read_project, validation_messages
+from ...io.project.spectrum_text import parse_spectrum
+from ...model import Art, Holdout, Iris, Lens, Light, Project, Scatter
+from ...model.project.light import SUN_DEG
+from ..common import field_angles, pair
+from .art_flags import art_flags
+from .options.record import RenderOptions
+
+# Flag of each key of a project file, for error messages.
+_FLAG_OF = {
+    "f_number": "--fstop",
+    "iris.blades": "--blades",
+    "iris.rotation_deg": "--rotation",
+    "iris.rounding": "--rounding",
+    "iris.roughness_um": "--roughness",
+    "dirt.dust_per_mm2": "--dust",
+    "dirt.scratches_per_cm2": "--scratches",
+    "dirt.fingerprint": "--fingerprint",
+    "dirt.image": "--dirt-image",
+    "dirt.seed": "--seed",
+    "starburst.size": "--starburst-size",
+    "starburst.spiral_deg": "--starburst-spiral",
+    "scatter.model": "--scatter",
+    "scatter.roughness_nm": "--surface-roughness",
+    "scatter.cleanliness_level": "--cleanliness",
+    "diameter_deg": "--light-diameter",
+    "distance": "--distance",
+    "shape.size_deg": "--light-size",
+    "shape.corners_deg": "--light-polygon",
+    "quality.ringing": "--ringing",
+    "camera.size_px": "--size",
+    "camera.sensor_mm": "--sensor",
+    "camera.sensor_distance": "--sensor-distance",
+    "camera.focus_distance": "--focus",
+    "camera.sensor_reflectance": "--sensor-reflectance",
+    "camera.sensor_grating": "--sensor-grating",
+    "imperfection.ghost_offset_mm": "--ghost-offset",
+    "camera.squeeze": "--squeeze",
+    "quality.mode": "--quality",
+    "quality.wavelengths": "--wavelengths",
+    "quality.paths": "--paths",
+    "quality.orders": "--orders",
+    "quality.order4_limit": "--order4-limit",
+    "quality.seed": "--seed",
+    "quality.reference_error": "--error",
+    "quality.reference_error_of": "--error-of",
+    "quality.reference_samples": "--samples",
+    "quality.reference_from": "--rays-from",
+    "output.layers": "--layers",
+    "output.brightest": "--brightest",
+    "output.colorspace": "--colorspace",
+    "output.gamut": "--gamut",
+    "intensity": "--intensity",
+}
+
+# flags that affect each scatter model; all affect a model that is not listed
+_SCATTER_USES: dict[str, tuple[str, ...]] = {"none": (), "chaumond": (), "abg": ("--cleanliness",)}
+
+
+def build_project(flags: RenderOptions) -> Project:
+    """Return the project of the flags, based on the project file or on a resumed render if there is one.
+
+    Parameters
+    ----------
+    flags : RenderOptions
+
+    Returns
+    -------
+    Project
+
+    Raises
+    ------
+    ProjectError
+        When a flag is invalid or something is missing; the error lists all findings.
+    """
+    _check_together(flags)
+    base = read_project(flags.project) if flags.project is not None else flags.resumed
+    if base is None and flags.lens is None:
+        raise ProjectError("no lens is given; name one (flarewright lenses lists them) or give a --project file")
+    if base is None and not flags.light:
+        raise ProjectError("no light is given; give its place in degrees by --light X,Y, for example --light 10,5")
+    fields: dict[str, Any] = {name: getattr(base, name) for name in Project.model_fields} if base else {}
+    if flags.lens is not None:
+        fields["lens"] = flags.lens
+    check_focus(fields["lens"], flags.focus, flags.sensor_distance)
+    fields["lights"] = _lights(flags, base.lights if base else ())
+    if flags.fstop is not None:
+        fields["f_number"] = flags.fstop
+    if flags.coating is not None:
+        fields["coating"] = parse_coating_choice(flags.coating)
+    if flags.zoom is not None:
+        fields["zoom"] = flags.zoom
+    if flags.filter_plate is not None:
+        fields["filter"] = parse_plate(flags.filter_plate, "--filter")
+    if flags.imperfection is not None:
+        fields["imperfection"] = parse_imperfection(flags.imperfection)
+    if flags.ghost_offset is not None:
+        # on its own it shifts ghosts only: the lens is as designed
+        nothing = {"seed": flags.seed or 0, "decentre_um": 0.0, "tilt_arcmin": 0.0}
+        fields["imperfection"] = {
+            **dict(fields.get("imperfection") or nothing),
+            "ghost_offset_mm": flags.ghost_offset,
+        }
+    if (iris := _iris(flags, fields["lens"], base)) is not None:
+        fields["iris"] = iris
+    for section, changes in _sections(flags).items():
+        given = {key: value for key, value in changes.items() if value is not None}
+        if given:
+            fields[section] = {**(dict(getattr(base, section)) if base else {}), **given}
+    scatter = base.scatter if base else None
+    changed = {
+        "scatter": scatter_flags(flags.scatter, flags.surface_roughness, flags.cleanliness, scatter),
+        "holdout": _holdout(flags, base.holdout if base else None),
+        "art": art_flags(flags, base.art if base else Art()),
+    }
+    fields |= {section: table for section, table in changed.items() if table is not None}
+    return project_of(fields)
+
+
+def project_of(fields: dict[str, Any]) -> Project:
+    """Return the project of fields that flags set; errors name the flags.
+
+    Raises
+    ------
+    ProjectError
+        A setting cannot be used.
+    """
+    try:
+        return Project.model_validate(fields)
+    except ValidationError as error:
+        # one flag may set more than one field
+        findings = list(dict.fromkeys(in_flags(sentence) for sentence in validation_messages(error, fields)))
+        if len(findings) == 1:
+            raise ProjectError(findings[0]) from None
+        message = f"{len(findings)} settings cannot be used, the first: {findings[0]}"
+        raise ProjectFileError(message, tuple(findings)) from None
+
+
+def _check_together(flags: RenderOptions) -> None:
+    """Raise an error for flags of which one makes another ineffective."""
+    shapes = {"--blades": flags.blades, "--rounding": flags.rounding, "--roughness": flags.roughness}
+    for flag, value in shapes.items():
+        if flags.iris_image is not None and value is not None:
+            raise ProjectError(f"{flag} shapes blades and --iris-image replaces them; keep one")
+        if flags.blades == 0 and value is not None and flag == "--rounding":
+            raise ProjectError(f"{flag} shapes blades and --blades 0 is round without any; keep one")
+    by_hand = {
+        "--rule": flags.rule, "--mute": flags.mute, "--solo": flags.solo, "--gain": flags.gain,
+        "--starburst-size": flags.starburst_size, "--starburst-spiral": flags.starburst_spiral,
+        "--ghost-offset": flags.ghost_offset,
+    }  # fmt: skip
+    for flag, change in by_hand.items():
+        if flags.physical and change not in (None, [], ()):
+            raise ProjectError(f"{flag} is an override and --physical ignores all overrides; keep one")
+    of_starburst = {
+        "--cats-eye": flags.cats_eye or None, "--starburst-size": flags.starburst_size,
+        "--starburst-spiral": flags.starburst_spiral,
+    }  # fmt: skip
+    for flag, shape in of_starburst.items():
+        if flags.no_starburst and shape is not None:
+            raise ProjectError(f"{flag} shapes the starburst and --no-starburst omits it; keep one")
+
+
+def check_focus(lens: str | Lens, focus: float | None, sensor_distance: float | None) -> None:
+    """Raise an error for a focus that the sensor's distance makes ineffective: of a lens without focusing groups."""
+    if focus is None or sensor_distance is None:
+        return
+    from ...render.scene.resolve import open_lens
+
+    if not any(position.focus_distance is not None for position in open_lens(lens).lens.positions):
+        raise ProjectError("--focus and --sensor-distance both place the sensor; keep one")
+
+
+def _sections(flags: RenderOptions) -> dict[str, dict[str, Any]]:
+    """Return settings of camera, quality and output from the flags, by section and key."""
+    size = None
+    if flags.size is not None:
+        width, height = pair(flags.size, "--size", "1280x720", "x")
+        if width != int(width) or height != int(height):
+            raise ProjectError(f"--size {flags.size!r} is not two whole numbers of pixels; write --size 1280x720")
+        size = (int(width), int(height))
+    dirt_image = None if flags.dirt_image is None else str(flags.dirt_image)
+    if dirt_image is not None and not Path(dirt_image).is_file():
+        raise ProjectError(f"--dirt-image {dirt_image} {_no_file(dirt_image)}; give a grey PNG or EXR image")
+    sensor = None if flags.sensor is None else pair(flags.sensor, "--sensor", "36x24 (mm)", "x")
+    return {
+        "camera": {
+            "size_px": size,
+            "sensor_mm": sensor,
+            "sensor_distance": flags.sensor_distance,
+            "focus_distance": flags.focus,
+            "cover_glass": None if flags.cover_glass is None else parse_plate(flags.cover_glass, "--cover-glass"),
+            "sensor_reflectance": flags.sensor_reflectance,
+            "sensor_grating": None if flags.sensor_grating is None else parse_grating(flags.sensor_grating),
+            "squeeze": flags.squeeze,
+            "desqueeze": True if flags.desqueeze else None,
+        },
+        "quality": {
+            "mode": flags.quality,
+            "wavelengths": flags.wavelengths,
+            "paths": flags.paths,
+            "orders": flags.orders,
+            "order4_limit": flags.order4_limit,
+            "ringing": flags.ringing,
+            "seed": flags.seed,
+            "reference_error": flags.error,
+            "reference_error_of": flags.error_of,
+            "reference_samples": flags.samples,
+            "reference_from": flags.rays_from,
+        },
+        "dirt": {
+            "dust_per_mm2": flags.dust,
+            "scratches_per_cm2": flags.scratches,
+            "fingerprint": flags.fingerprint,
+            "image": dirt_image,
+            "seed": flags.seed,
+        },
+        "starburst": {
+            "cats_eye": True if flags.cats_eye else None,
+            "size": flags.starburst_size,
+            "spiral_deg": flags.starburst_spiral,
+        },
+        "output": {
+            "layers": flags.layers,
+            "brightest": flags.brightest,
+            "colorspace": flags.colorspace,
+            "gamut": flags.gamut,
+            "pixel_type": "half" if flags.half else "float" if flags.float32 else None,
+            "starburst": False if flags.no_starburst else None,
+        },
+    }
+
+
+def _lights(flags: RenderOptions, base: tuple[Light, ...]) -> list[dict[str, Any]]:
+    """Return the lights: those of the flags, else those of the project, with intensities and spectra of the flags."""
+    lights = [parsed_light(text) for text in flags.light] if flags.light else [dict(light) for light in base]
+    spectra = [parse_spectrum(text) for text in flags.spectrum]
+    for name, values in (
+        ("intensity", flags.intensity),
+        ("spectrum", spectra),
+        ("distance", [None if distance == float("inf") else distance for distance in flags.distance]),
+    ):
+        _share_out(_FLAG_OF.get(name, f"--{name}"), [{name: value} for value in values], lights)
+    _extents(flags, lights)
+    return lights
+
+
+def _share_out(flag: str, changes: list[dict[str, Any]], lights: list[dict[str, Any]], *, others: bool = False) -> None:
+    """Apply the values of a flag to lights: one for all, or one for each."""
+    if changes and len(changes) not in (1, len(lights)):
+        what = f"{'other ' if others else ''}light{'' if len(lights) == 1 else 's'}"
+        raise ProjectError(
+            f"{flag} is given {len(changes)} times for {len(lights)} {what}; give it once for all "
+            f"{'other ' if others else ''}lights, or once per light in the same order"
+        )
+    for k, light in enumerate(lights):
+        if changes:
+            light.update(changes[k % len(changes)])
+
+
+def _extents(flags: RenderOptions, lights: list[dict[str, Any]]) -> None:
+    """Set the shapes of lights: discs, rectangles or polygons; a sun is a disc already."""
+    shapes: dict[str, list[dict[str, Any]]] = {
+        "--light-size": [{"kind": "rectangle", "size_deg": _size(text)} for text in flags.light_size],
+        "--light-polygon": [{"kind": "polygon", "corners_deg": _corners(text)} for text in flags.light_polygon],
+    }
+    given = [flag for flag, values in {"--light-diameter": flags.light_diameter, **shapes}.items() if values]
+    if len(given) > 1:
+        raise ProjectError(
+            f"{' and '.join(given)} each set the shape of lights; give one of them, or write a project file for "
+            "lights of several kinds"
+        )
+    _share_out("--light-diameter", [{"diameter_deg": angle, "shape": None} for angle in flags.light_diameter], lights)
+    suns = [light for light in lights if flags.light and light.get("name") == "sun"]
+    rest = [light for light in lights if light not in suns]
+    for flag, values in shapes.items():
+        if values and not rest:
+            raise ProjectError(f"{flag}: --light sun@X,Y is a disc already; write --light X,Y for this shape")
+        _share_out(flag, [{"shape": shape, "diameter_deg": 0.0} for shape in values], rest, others=bool(suns))
+
+
+def parsed_light(text: str) -> dict[str, Any]:
+    """Return the fields of a light from `--light`, X,Y or sun@X,Y."""
+    word, at, place = text.rpartition("@")
+    if at and word.strip().lower() != "sun":
+        raise ProjectError(f"--light {text!r}: there is no {word.strip()!r}; write --light 10,5 or --light sun@10,5")
+    if text.strip().lower() == "sun":
+        raise ProjectError("--light sun has no place; write --light sun@10,5 (degrees right and up)")
+    found: dict[str, Any] = {"field_deg": field_angles(place)}
+    return {**found, "name": "sun", "diameter_deg": SUN_DEG} if at else found
+
+
+def _size(text: str) -> tuple[float, float]:
+    return pair(text, "--light-size", "4x3 (degrees wide and high)", "x")
+
+
+def _corners(text: str) -> tuple[tuple[float, float], ...]:
+    """Return the corners of `--light-polygon "X,Y X,Y X,Y"`."""
+    corners = tuple(pair(corner, "--light-polygon", '"0,0 3,0 3,1" (degrees right and up)') for corner in text.split())
+    if len(corners) < 3:
+        raise ProjectError(
+            f"--light-polygon {text!r} has {len(corners)} corners; give three or more, --light-polygon "
+            '"0,0 3,0 3,1" (degrees right and up)'
+        )
+    return corners
+
+
+def _iris(flags: RenderOptions, lens: Any, base: Project | None) -> dict[str, Any] | None:
+    """Return the iris with the flags' changes, or None when no flag changes it."""
+    mask = None if flags.iris_image is None else str(flags.iris_image)
+    if mask is not None and not Path(mask).is_file():
+        raise ProjectError(f"--iris-image {mask} {_no_file(mask)}; give a grey PNG or EXR image")
+    changes = {
+        "blades": flags.blades,
+        "rotation_deg": flags.rotation,
+        "rounding": flags.rounding,
+        "mask": mask,
+        "roughness_um": flags.roughness,
+        "roughness_seed": flags.seed if flags.roughness else None,
+    }
+    given = {key: value for key, value in changes.items() if value is not None}
+    if not given:
+        return None
+    if base is not None and base.iris is not None and flags.lens is None:
+        iris = base.iris
+    elif isinstance(lens, str):
+        # Rotating the blades must keep the lens' number of them.
+        from ...render.scene.resolve import open_lens
+
+        iris = open_lens(lens).lens.iris
+    else:
+        iris = lens.iris if lens is not None else Iris()
+    return {**dict(iris), **given}
+
+
+def _no_file(path: str | Path) -> str:
+    """Describe a path that is no file."""
+    return "is a folder" if Path(path).is_dir() else "does not exist"
+
+
+def _holdout(flags: RenderOptions, base: Holdout | None) -> dict[str, Any] | None:
+    """Return the occluder with the flags' file, or None when no flag names one."""
+    given = {"image": flags.holdout, "depth": flags.depth}
+    if flags.holdout is not None and flags.depth is not None:
+        raise ProjectError("--holdout and --depth both hide lights; give one of them")
+    for flag, path in (("--holdout", flags.holdout), ("--depth", flags.depth)):
+        if path is not None and not path.is_file():
+            what = "a grey PNG or EXR image" if flag == "--holdout" else "an EXR depth plate"
+            raise ProjectError(f"{flag} {path} {_no_file(path)}; give {what} in the picture's frame")
+    if flags.holdout is None and flags.depth is None:
+        return None
+    kept = dict(base) if base is not None and (base.image is None) == (flags.holdout is None) else {}
+    return {**kept, **{key: None if path is None else str(path) for key, path in given.items()}}
+
+
+def scatter_flags(
+    model: str | None, roughness: float | None, cleanliness: float | None, base: Scatter | None = None
+) -> dict[str, Any] | None:
+    """Return the scatter settings with the flags' changes, or None when no flag changes them.
+
+    Parameters
+    ----------
+    model : str or None
+        `--scatter`.
+    roughness, cleanliness : float or None
+        `--surface-roughness` and `--cleanliness`; each of them enables scatter.
+    base : Scatter or None
+        Settings of the project.
+    """
+    changes = {"model": model, "roughness_nm": roughness, "cleanliness_level": cleanliness}
+    given = {key: value for key, value in changes.items() if value is not None}
+    if not given:
+        return None
+    used = _SCATTER_USES.get(model or "", ("--surface-roughness", "--cleanliness"))
+    for flag, value in (("--surface-roughness", roughness), ("--cleanliness", cleanliness)):
+        if value is not None and flag not in used:
+            raise ProjectError(f"{flag} has no effect on --scatter {model}; keep one")
+    known = dict(base) if base is not None else {}
+    if known.get("model") == "none":
+        del known["model"]
+    return {"model": "harvey-shack", **known, **given}
+
+
+def in_flags(sentence: str) -> str:
+    """Replace keys of a project file in a message by flags."""
+    for key, flag in _FLAG_OF.items():
+        found = re.match(rf"(?:lights\[\d+\]\.)?{re.escape(key)}(?:\[\d\])?(?=[ :])", sentence)
+        if found:
+            return flag + sentence[found.end() :]
+    return sentence

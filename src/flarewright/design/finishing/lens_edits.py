@@ -1,0 +1,258 @@
+"""Direct changes of a lens without a search (Van Acoleyen 2025, sections 5.3.3 and 5.3.5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...errors import LensError, ProjectError
+from ...kernels.design import ghosts as columns
+from ...model import Lens, Stop, Surface
+from ...optics.lens.paraxial import first_order
+from ...render.scene.resolve import complete_lens
+from ...typing import Floats
+from ..problem.ghosts import evaluate
+from ..problem.opening import opened_to
+from ..problem.prescription import structure_of, vector_of
+
+# number of curvatures tried on either side, and of bisections
+TRIED = 4000
+HALVINGS = 60
+# largest semi-diameter of a surface as a fraction of its radius
+STEEPEST = 0.98
+
+
+@dataclass(frozen=True)
+class Resized:
+    """A lens with one ghost resized, and the effect on all ghosts.
+
+    Attributes
+    ----------
+    lens : Lens
+    row : int
+        The mirror whose curvature changed, or the row whose diameter changed.
+    ghosts : tuple of (int, int)
+    before, after : ndarray, shape (G, 2)
+        Place (mm per unit slope of the light) and signed radius (mm).
+    """
+
+    lens: Lens
+    row: int
+    ghosts: tuple[tuple[int, int], ...]
+    before: Floats
+    after: Floats
+
+
+def resize_ghost(
+    lens: Lens,
+    ghost: tuple[int, int],
+    height: float,
+    *,
+    mirror: Literal["first", "second"] = "first",
+    f_number: float | None = None,
+) -> Resized:
+    """Resize one ghost by the radius of one of its two mirrors.
+
+    Parameters
+    ----------
+    lens : Lens
+        Complete.
+    ghost : (int, int)
+        Rows j, then i < j.
+    height : float
+        Factor on its radius.
+    mirror : {"first", "second"}
+        Row whose curvature changes, j or i.
+    f_number : float, optional
+        None: wide open. The stop's diameter and the sensor's distance are constant.
+
+    Returns
+    -------
+    Resized
+        With the solution of nearest curvature.
+
+    Raises
+    ------
+    ProjectError
+        When the lens has no such ghost, or no curvature of that row gives this size.
+    LensError
+        When the lens forms no image any more, or a lens file cannot hold its f-number.
+    """
+    structure = structure_of(lens)
+    if ghost not in structure.pairs:
+        raise ProjectError(
+            f"{lens.name} has no ghost {ghost[0]}-{ghost[1]} that reflects twice on one side of the stop; "
+            "flarewright ghosts LENS --paths same-side lists them"
+        )
+    order = first_order(lens, f_number)
+    vector = vector_of(lens, 2.0 * order.stop_semi_diameter, order.sensor_distance)
+    row = ghost[0] if mirror == "first" else ghost[1]
+    surface = lens.rows[row]
+    assert isinstance(surface, Surface)
+    assert surface.semi_diameter is not None
+    entrance = 2.0 * (getattr(lens.rows[0], "semi_diameter", None) or order.entrance_pupil_diameter)
+    g, at = structure.pairs.index(ghost), 1 + structure.rows + row
+
+    def radii(curvatures: Floats) -> Floats:
+        many = np.repeat(vector[None], len(curvatures), axis=0)
+        many[:, at] = curvatures
+        return np.asarray(np.abs(evaluate(structure, many, entrance)[:, g, columns.RADIUS]), dtype=np.float64)
+
+    before = evaluate(structure, vector[None], entrance)[0]
+    wanted = height * abs(before[g, columns.RADIUS])
+    curvature = _nearest_root(lambda c: radii(c) - wanted, surface.curvature, STEEPEST / surface.semi_diameter)
+    if curvature is None:
+        raise ProjectError(
+            f"no curvature of row {row} makes ghost {ghost[0]}-{ghost[1]} {height:g} times as large; "
+            "change the other mirror, or choose another size"
+        )
+    vector[at] = curvature
+    after = evaluate(structure, vector[None], entrance)[0]
+    rows = list(lens.rows)
+    rows[row] = surface.replace(curvature=curvature)
+    bent = lens.replace(rows=tuple(rows), sensor_distance=order.sensor_distance)
+    # the same stop diameter gives another f-number when the lens in front of the stop changes
+    bent = complete_lens(opened_to(bent, float(vector[0])))
+    kept = [columns.PLACE, columns.RADIUS]
+    return Resized(bent, row, structure.pairs, before[:, kept], after[:, kept])
+
+
+def resize_all(
+    lens: Lens, height: float, *, by: Literal["stop", "entrance"] = "stop", f_number: float | None = None
+) -> Resized:
+    """Resize all ghosts bounded by one opening, the stop or the entrance.
+
+    Parameters
+    ----------
+    lens : Lens
+        Complete.
+    height : float
+        Factor on the diameter of the stop or of the first surface.
+    by : {"stop", "entrance"}
+    f_number : float, optional
+        None: wide open.
+
+    Returns
+    -------
+    Resized
+        Ghosts bounded by the other opening keep their size, or become bounded by this one.
+
+    Raises
+    ------
+    ProjectError
+        When the stop is the first row, or the first surface would be wider than its sphere.
+    LensError
+        When a lens file cannot hold the f-number.
+
+    Notes
+    -----
+    Van Acoleyen 2025, section 5.3.1.
+    """
+    structure, order = structure_of(lens), first_order(lens, f_number)
+    vector = vector_of(lens, 2.0 * order.stop_semi_diameter, order.sensor_distance)
+    front = lens.rows[0]
+    if by == "entrance" and not isinstance(front, Surface):
+        raise ProjectError(
+            f"the stop is the first row of {lens.name}, so nothing else bounds the entrance; resize by stop"
+        )
+    entrance = 2.0 * (getattr(front, "semi_diameter", None) or order.entrance_pupil_diameter)
+    before = evaluate(structure, vector[None], entrance)[0]
+    if by == "stop":
+        row, vector[0] = lens.stop_row, height * vector[0]
+        changed = opened_to(lens, float(vector[0]))
+    else:
+        assert isinstance(front, Surface)
+        row, entrance = 0, height * entrance
+        if abs(front.curvature) * 0.5 * entrance > STEEPEST:
+            raise ProjectError(
+                f"row 0 of {lens.name} is a sphere of radius {1.0 / abs(front.curvature):.4g} mm, and {height:g} times "
+                "its opening is wider than that; use a smaller size"
+            )
+        changed = lens.replace(rows=(front.replace(semi_diameter=0.5 * entrance), *lens.rows[1:]))
+        if f_number is not None:
+            changed = changed.replace(f_number=f_number)
+    after = evaluate(structure, vector[None], entrance)[0]
+    kept = [columns.PLACE, columns.RADIUS]
+    return Resized(complete_lens(changed), row, structure.pairs, before[:, kept], after[:, kept])
+
+
+def _nearest_root(function: object, start: float, largest: float) -> float | None:
+    """Return the root nearest to a start within +-largest."""
+    assert callable(function)
+    # fine steps near the old curvature, coarse ones far from it
+    steps = np.concatenate([[0.0], np.geomspace(1e-9, 2.0 * largest, TRIED)])
+    best: float | None = None
+    for way in (1.0, -1.0):
+        tried = start + way * steps
+        tried = tried[np.abs(tried) <= largest]
+        if len(tried) < 2:
+            continue
+        values = function(tried)
+        changes = np.flatnonzero(values[:-1] * values[1:] <= 0.0)
+        if changes.size == 0:
+            continue
+        low, high = float(tried[changes[0]]), float(tried[changes[0] + 1])
+        side = float(values[changes[0]])
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            if float(function(np.array([middle]))[0]) * side > 0.0:
+                low = middle
+            else:
+                high = middle
+        found = 0.5 * (low + high)
+        # a pole changes sign as well, but is no root
+        if abs(float(function(np.array([found]))[0])) > 1e-3 * max(abs(side), 1e-9) + 1e-6:
+            continue
+        if best is None or abs(found - start) < abs(best - start):
+            best = found
+    return best
+
+
+def move_stop(lens: Lens, row: int) -> Lens:
+    """Make another row the stop: it becomes a plane in air, and the old stop is removed.
+
+    Parameters
+    ----------
+    lens : Lens
+        Complete.
+    row : int
+        In the present lens; air must be in front of it. The gap behind it becomes air.
+
+    Returns
+    -------
+    Lens
+        Its stop has the same diameter as before.
+
+    Raises
+    ------
+    ProjectError
+        When the row is the stop already, does not exist, or has glass in front of it.
+    LensError
+        When the lens forms no image any more, or a lens file cannot hold its f-number.
+    """
+    old = lens.stop_row
+    if row == old:
+        raise ProjectError(f"row {row} is the stop already: choose another row")
+    if not 0 <= row < len(lens.rows):
+        raise ProjectError(f"row {row} cannot become the stop: choose a surface between 0 and {len(lens.rows) - 1}")
+    front = lens.rows[row - 1] if row else None
+    if isinstance(front, Surface) and front.medium is not None:
+        free = [
+            str(k) for k, one in enumerate(lens.rows)
+            if k != old and (k == 0 or getattr(lens.rows[k - 1], "medium", None) is None) and isinstance(one, Surface)
+        ]  # fmt: skip
+        raise ProjectError(f"row {row} cannot become the stop: glass is in front of it; rows {', '.join(free)} can")
+    diameter = 2.0 * first_order(lens).stop_semi_diameter
+    rows = list(lens.rows)
+    rows[row] = Stop(thickness=rows[row].thickness)
+    gone = rows.pop(old)
+    if 0 < old < len(rows):
+        rows[old - 1] = rows[old - 1].replace(thickness=rows[old - 1].thickness + gone.thickness)
+    presets = {name: tuple(c for k, c in enumerate(all_) if k != old) for name, all_ in lens.coating_presets.items()}
+    try:
+        moved = lens.replace(rows=tuple(rows), coating_presets=presets, elements=(), f_number=1.0)
+    except ValueError as error:
+        raise LensError(f"with its stop at row {row}, {lens.name} has no glass: choose another row") from error
+    return complete_lens(opened_to(moved, diameter))

@@ -1,0 +1,12 @@
+"""Commands: functions from a project and values of the page to a new project.
+
+Public entry points: `registry.COMMANDS` and `registry.done`, which checks and runs a command by its name.
+
+- `registry`: all commands by name, with labels for the history
+- `shot`: light, camera, iris, dirt, coating, quality
+- `light_path`: keyframes of a light's path
+- `ghosts`: solo, mute, gain and tint of single ghosts
+- `design_targets`: ghost targets of the project's design
+- `lens`: the prescription: cells, rows, stop, another lens; `prescription` returns the table
+- `lens_notes`: remarks on cells of the prescription
+"""

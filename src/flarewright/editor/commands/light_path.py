@@ -1,0 +1,97 @@
+"""The path of a light: keyframes with linear interpolation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import ProjectError
+from ...model import Light, LightKey, Project
+
+# time step of keys: two times within half a step belong to the same key
+STEP_S = 0.01
+
+
+def light_at(light: Light, at_s: float) -> Light:
+    """Return a light at its place at a time; a light without a path stays.
+
+    Parameters
+    ----------
+    light : Light
+    at_s : float
+        The light rests before the first key and after the last one.
+
+    Returns
+    -------
+    Light
+    """
+    if not light.keyframes:
+        return light
+    times = [key.at_s for key in light.keyframes]
+    x, y = (
+        float(np.interp(at_s, times, angles)) for angles in zip(*(k.field_deg for k in light.keyframes), strict=True)
+    )
+    placed: Light = light.replace(field_deg=(round(x, 4), round(y, 4)))
+    return placed
+
+
+def go_to(project: Project, at_s: float) -> Project:
+    """Put every light with a path at its place at a time."""
+    placed: Project = project.replace(lights=tuple(light_at(light, float(at_s)) for light in project.lights))
+    return placed
+
+
+def set_key(project: Project, light: int, at_s: float, field_deg: list[float] | None = None) -> Project:
+    """Set a key of a light at a time, at its present or given angles; an existing key is moved."""
+    chosen = _light(project, light)
+    at_s = round(max(float(at_s), 0.0) / STEP_S) * STEP_S
+    place = chosen.field_deg if field_deg is None else tuple(field_deg)
+    new = LightKey(at_s=round(at_s, 6), field_deg=place)
+    others = [key for key in chosen.keyframes if abs(key.at_s - new.at_s) > 0.5 * STEP_S]
+    return _with_keys(project, light, [*others, new])
+
+
+def move_key(project: Project, light: int, number: int, at_s: float) -> Project:
+    """Change the time of a key; two keys cannot have the same time."""
+    key = _key(project, light, number)
+    at_s = round(round(max(float(at_s), 0.0) / STEP_S) * STEP_S, 6)
+    others = [each for k, each in enumerate(_light(project, light).keyframes) if k != number]
+    if any(abs(each.at_s - at_s) <= 0.5 * STEP_S for each in others):
+        raise ProjectError(f"there is a key at {at_s:g} s already; move or remove it first")
+    return _with_keys(project, light, [*others, key.replace(at_s=at_s)])
+
+
+def remove_key(project: Project, light: int, number: int) -> Project:
+    """Remove a key."""
+    gone = _key(project, light, number)
+    return _with_keys(project, light, [key for key in _light(project, light).keyframes if key is not gone])
+
+
+def clear_keys(project: Project, light: int) -> Project:
+    """Remove the whole path; the light stays where it is."""
+    _light(project, light)
+    return _with_keys(project, light, [])
+
+
+def length_s(project: Project) -> float:
+    """Return the time of the last key of all lights; 0 without keys."""
+    return max((light.keyframes[-1].at_s for light in project.lights if light.keyframes), default=0.0)
+
+
+def _light(project: Project, light: int) -> Light:
+    if not 0 <= light < len(project.lights):
+        raise ProjectError(f"there is no light {light}; they count from 0 to {len(project.lights) - 1}")
+    return project.lights[light]
+
+
+def _key(project: Project, light: int, number: int) -> LightKey:
+    keys = _light(project, light).keyframes
+    if not 0 <= number < len(keys):
+        raise ProjectError(f"there is no key {number}; the path has {len(keys)}")
+    return keys[number]
+
+
+def _with_keys(project: Project, light: int, keys: list[LightKey]) -> Project:
+    lights = list(project.lights)
+    lights[light] = lights[light].replace(keyframes=tuple(sorted(keys, key=lambda key: key.at_s)))
+    changed: Project = project.replace(lights=tuple(lights))
+    return changed

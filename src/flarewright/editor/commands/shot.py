@@ -1,0 +1,189 @@
+"""Commands for light, camera, iris, dirt, coating and quality: a project and values in, a new project out."""
+
+from __future__ import annotations
+
+from itertools import count
+from typing import Any
+
+from ...errors import ProjectError
+from ...io.lens.coating_text import parse_coating_choice
+from ...io.project.look_file import read_look, shipped_looks
+from ...io.project.spectrum_text import parse_spectrum
+from ...measure.replay.measured_project import check_measured, is_measured
+from ...model import BlackBody, Everywhere, Holdout, Iris, Light, PerRow, Project, QuarterWave, Surface
+from ...render.scene.looks import with_look
+from ...render.scene.resolve import open_lens, resolve_project
+
+# largest angle of a dragged light: beyond it a flat picture has no place for the light
+STEEPEST_DEG = 80.0
+
+
+def move_light(project: Project, light: int, x: float, y: float) -> Project:
+    """Put a light at field angles, degrees right and up, limited to `STEEPEST_DEG`."""
+    held = tuple(max(-STEEPEST_DEG, min(STEEPEST_DEG, round(angle, 4))) for angle in (x, y))
+    return set_light(project, light, {"field_deg": held})
+
+
+def set_light(project: Project, light: int, values: dict[str, Any]) -> Project:
+    """Change fields of a light; `spectrum` has the syntax of the command line."""
+    lights = list(project.lights)
+    if not 0 <= light < len(lights):
+        raise ProjectError(f"there is no light {light}; they count from 0 to {len(lights) - 1}")
+    changes = dict(values)
+    if isinstance(changes.get("spectrum"), str):
+        changes["spectrum"] = parse_spectrum(changes["spectrum"])
+    if changes.get("diameter_deg"):
+        changes["shape"] = None
+    lights[light] = lights[light].replace(**changes)
+    return _with(project, lights=tuple(lights))
+
+
+def add_light(project: Project) -> Project:
+    """Add a light on the other side of the picture."""
+    x, y = project.lights[-1].field_deg
+    taken = {light.name for light in project.lights}
+    name = next(name for k in count(len(project.lights) + 1) if (name := f"light {k}") not in taken)
+    new = Light(name=name, field_deg=(-x, y), spectrum=BlackBody(temperature_k=3200.0))
+    return _with(project, lights=(*project.lights, new))
+
+
+def remove_light(project: Project, light: int) -> Project:
+    """Remove a light; the last one cannot be removed."""
+    if len(project.lights) == 1:
+        raise ProjectError("a flare needs a light; move the last one instead")
+    return _with(project, lights=tuple(one for k, one in enumerate(project.lights) if k != light))
+
+
+def set_camera(project: Project, values: dict[str, Any]) -> Project:
+    """Change fields of the camera; if only the picture's width changes, the sensor keeps its shape."""
+    return _with(project, camera=project.camera.replace(**values))
+
+
+def set_quality(project: Project, values: dict[str, Any]) -> Project:
+    """Change fields of the quality."""
+    return _with(project, quality=project.quality.replace(**values))
+
+
+def set_fields(project: Project, values: dict[str, Any]) -> Project:
+    """Change fields of the project itself: f_number, limited to the lens' range, and zoom."""
+    known = {"f_number", "zoom"}
+    if unknown := set(values) - known:
+        raise ProjectError(f"{', '.join(sorted(unknown))} cannot be set here; known are {', '.join(sorted(known))}")
+    if is_measured(project):
+        changed = _with(project, **values)
+        check_measured(changed, limit=True)
+        return changed
+    if (f_number := values.get("f_number")) is not None:
+        values = {**values, "f_number": max(f_number, open_lens(project.lens).lens.f_number)}
+    changed = _with(project, **values)
+    resolve_project(changed)
+    return changed
+
+
+def iris_of(project: Project) -> Iris:
+    """Return the iris of the project, else that of its lens file."""
+    return project.iris if project.iris is not None else open_lens(project.lens).lens.iris
+
+
+def set_iris(project: Project, values: dict[str, Any]) -> Project:
+    """Change the iris; other fields keep the values of the lens file."""
+    iris = iris_of(project)
+    changes = dict(values)
+    if changes.get("blades") in (1, 2):
+        # the slider passes over blade counts that no iris has
+        changes["blades"] = 3 if iris.blades < 3 else 0
+    return _with(project, iris=iris.replace(**changes))
+
+
+def set_holdout(project: Project, light: int | None, values: dict[str, Any] | None) -> Project:
+    """Change the occluder of all lights, or an additional one of a single light; None removes it.
+
+    Parameters
+    ----------
+    project : Project
+    light : int or None
+        None: all of them.
+    values : dict or None
+        Fields of `Holdout`; an image replaces a depth plate, and vice versa.
+
+    Returns
+    -------
+    Project
+    """
+    if light is not None and not 0 <= light < len(project.lights):
+        raise ProjectError(f"there is no light {light}; they count from 0 to {len(project.lights) - 1}")
+    old = project.holdout if light is None else project.lights[light].holdout
+    new: Holdout | None = None
+    if values is not None:
+        changes = dict(values)
+        if changes.get("image"):
+            changes["depth"] = None
+        elif changes.get("depth"):
+            changes |= {"image": None, "invert": False}
+        new = Holdout(**changes) if old is None else old.replace(**changes)
+    return _with(project, holdout=new) if light is None else set_light(project, light, {"holdout": new})
+
+
+def set_dirt(project: Project, values: dict[str, Any]) -> Project:
+    """Change dust, scratches and other dirt."""
+    return _with(project, dirt=project.dirt.replace(**values))
+
+
+def set_starburst(project: Project, values: dict[str, Any]) -> Project:
+    """Change the starburst settings."""
+    return _with(project, starburst=project.starburst.replace(**values))
+
+
+def set_pass_gain(project: Project, name: str, gain: float) -> Project:
+    """Set the gain of a whole pass, "ghosts", "starburst" or "scatter"; 1 is physical."""
+    gains = {key: value for key, value in project.art.gain.items() if key != name}
+    if gain != 1.0:
+        gains[name] = gain
+    return _with(project, art=project.art.replace(gain=gains))
+
+
+def set_coating(project: Project, text: str) -> Project:
+    """Set the coating of the whole lens from a short text with the syntax of `--coating`."""
+    changed = _with(project, coating=parse_coating_choice(text))
+    resolve_project(changed)
+    return changed
+
+
+def put_look(project: Project, name: str) -> Project:
+    """Apply a shipped look to the lens and the lights."""
+    if is_measured(project):
+        raise ProjectError("a measured flare has the look of its lens; choose a lens first")
+    if name not in shipped_looks():
+        raise ProjectError(f"the library has no look {name!r}")
+    changed, _ = with_look(project, read_look(name))
+    resolve_project(changed)
+    return changed
+
+
+def set_row_wavelengths(project: Project, values: dict[str, float]) -> Project:
+    """Give rows quarter-wave coatings of the stated centre wavelengths; the other rows are unchanged."""
+    from ...optics.rays.pack import resolve_coatings
+
+    lens = open_lens(project.lens).lens
+    coats = list(resolve_coatings(lens, project.coating))
+    for key, wavelength_nm in values.items():
+        row = int(key)
+        if not 0 <= row < len(coats) or not isinstance(lens.rows[row], Surface):
+            raise ProjectError(f"row {row} is no surface; nothing can be coated there")
+        coats[row] = QuarterWave(center_wavelength_nm=float(wavelength_nm))
+    return _with(project, coating=PerRow(coatings=tuple(coats)))
+
+
+def coating_text(project: Project) -> str:
+    """Return the coating of the whole lens as a short text; "per-row" where rows differ."""
+    from ...io.lens.coating_text import format_coating
+
+    choice = project.coating
+    if isinstance(choice, Everywhere):
+        return format_coating(choice.coating)
+    return f"preset:{choice.name}" if choice.kind == "preset" else choice.kind
+
+
+def _with(project: Project, **changes: Any) -> Project:
+    changed: Project = project.replace(**changes)
+    return changed

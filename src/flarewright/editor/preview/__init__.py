@@ -1,0 +1,16 @@
+"""Pictures of the editor: drafts during a drag, final pictures at rest, and diagrams.
+
+Public entry points: `viewport.Screen`, `drag.Drag`, `progressive_render.sharpen`, `queries`.
+
+- `viewport`: `Screen` holds the shown picture and schedules rendering
+- `progressive_render`: `sharpen` renders draft, traced preview and final picture in turn
+- `drag`: `Drag` draws pictures during a drag, at a size that keeps up
+- `render_picture`: `take` renders one picture; sizes, quality and exposure
+- `picture`: `DrawnPicture`, the rendered result
+- `display_image`: exposure, look, background, JPEG and PNG
+- `draft_match`: `Match`, the gains that match drafts to final pictures
+- `draft_calibration`: these gains as a function of the field angle
+- `ghost_picking`: the ghost table, ghosts under the pointer, outlines
+- `queries`: requests of the page to a screen: target picture, picking, outline
+- `diagrams`: cross-section, coating charts, colour maps, library
+"""

@@ -1,0 +1,13 @@
+"""The web server of the editor.
+
+Public entry points: `app.serve`, `app.make_app`, `workspace.Workspace`.
+
+- `app`: routes, request handlers, and `serve`
+- `workspace`: `Workspace` joins session, screen, solver and browser tabs
+- `access`: `Access`, and `Guard`, which checks origin and token of requests
+- `tokens`: the token: chosen, or random and kept
+- `turns`: `Turns` runs the work of requests on a few threads, with a bounded queue
+- `messages`: JSON objects of requests and sockets, of bounded depth
+- `page_state`: the state of the session as JSON for the page
+- `uploads`: dropped and chosen files
+"""

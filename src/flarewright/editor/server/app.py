@@ -1,0 +1,586 @@
+"""The web server of the editor: routes and request handlers."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import json
+import logging
+import signal
+import sys
+import tempfile
+import threading
+import traceback
+from collections.abc import Awaitable, Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from functools import partial, wraps
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.background import BackgroundTask
+from starlette.exceptions import HTTPException
+from starlette.middleware import Middleware
+from starlette.middleware.body_limit import RequestBodyLimitMiddleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from ...errors import FlarewrightError, ProjectError
+from ...io.images.thumbnails import thumbnail
+from ...model import Project
+from ..commands.light_path import go_to
+from ..commands.shot import move_light
+from ..preview import diagrams, queries
+from ..preview.drag import Moved
+from ..preview.ghost_picking import ghost_csv
+from ..preview.viewport import packed_pixels, shown_pixels
+from ..session import files
+from ..session.image_files import in_short
+from .access import Access, Guard, SafeHeaders
+from .messages import brief, object_of
+from .page_state import ghost_rows
+from .turns import Crowded
+from .uploads import MOST_BYTES, take_in
+from .workspace import MOST_SOCKETS, TRY_AGAIN, Workspace, received
+
+STATIC = Path(__file__).parents[1] / "static"
+IMPORT = "/api/import"
+MOST_SECONDS = 3600.0
+# largest body of a request, except of a dropped file, and largest message of a socket, bytes
+MOST_BODY, MOST_MESSAGE = 2**20, 2**16
+# pictures of a drag that one page has drawn at the same time; of further requests the newest waits
+AT_ONCE = 2
+# pictures are compressed already; answers in progress have a moment, in seconds, when the server ends
+SERVER: dict[str, Any] = {
+    "ws": "websockets-sansio", "ws_per_message_deflate": False, "ws_max_size": MOST_MESSAGE,
+    "timeout_graceful_shutdown": 0.2, "log_level": "warning", "lifespan": "off", "proxy_headers": False,
+}  # fmt: skip
+CROWDED = "the editor has too many unanswered requests; try again in a moment"
+ENDED = "the editor has ended"
+
+Answer = Callable[[Request], Awaitable[Response]]
+Work = Callable[[Workspace, Request, Any], Any]
+
+
+class Left(Exception):  # noqa: N818 (not an error: no client awaits the result)
+    """Raised inside a work whose client has left."""
+
+
+def reported(work: Work) -> Callable[[Workspace], Answer]:
+    """Turn a function of request and body into a handler: its result as JSON, its error as one sentence.
+
+    The body is a JSON object, or the bytes of a file.
+    """
+
+    def bind(workspace: Workspace) -> Answer:
+        @wraps(work)
+        async def answer(request: Request) -> Response:
+            post = request.method == "POST"
+            try:
+                raw = await request.body() if post else b""
+                body: Any = raw if work is _import else object_of(raw)
+
+                def asked(left: threading.Event) -> Any:
+                    request.state.left = left
+                    return work(workspace, request, body)
+
+                turns = workspace.changes if post else workspace.questions
+                result = await turns.run_for(asked, partial(_left, request))
+            except HTTPException:
+                raise
+            except Crowded:
+                return _error(CROWDED, 503)
+            except (asyncio.CancelledError, Left):
+                # the server ends, or the client has left
+                return _error(ENDED, 503)
+            except Exception as error:
+                return _error(_sentence(workspace, error), 400)
+            if isinstance(result, Response):
+                return result
+            return JSONResponse(result if result is not None else {})
+
+        return answer
+
+    return bind
+
+
+async def _left(request: Request) -> None:
+    """Return when the client of a request has left."""
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
+
+
+def _error(words: str, status: int) -> Response:
+    return JSONResponse({"error": words}, status_code=status)
+
+
+def _sentence(workspace: Workspace, error: Exception) -> str:
+    """Return one sentence on why a request failed."""
+    if isinstance(error, FlarewrightError):
+        return in_short(str(error), workspace.session.project, workspace.session.file)
+    if not isinstance(error, ValueError | LookupError | TypeError | ArithmeticError | AttributeError | OSError):
+        # a bug, which a page can cause but not mend
+        traceback.print_exception(error)
+    return f"the editor did not understand the page: {brief(str(error) or type(error).__name__)}"
+
+
+async def _refused(_request: Request, error: Exception) -> Response:
+    """Answer a request that has no handler, or is too large, by one sentence."""
+    assert isinstance(error, HTTPException)
+    words = (
+        f"the request is larger than the editor reads, {MOST_BODY // 2**20} MB, or {MOST_BYTES // 2**20} MB for a file"
+    )
+    return _error(words if error.status_code == 413 else error.detail, error.status_code)
+
+
+def _state(workspace: Workspace, _request: Request, _body: Any) -> Any:
+    return workspace.state()
+
+
+def _do(workspace: Workspace, _request: Request, body: Any) -> Any:
+    table = body.get("table")
+    group = str(body.get("group", ""))
+    became = workspace.session.do(
+        str(body["name"]), dict(body.get("values", {})), group, None if table is None else str(table)
+    )
+    return workspace.state() | {"became": became}
+
+
+def _view(workspace: Workspace, _request: Request, body: Any) -> Any:
+    workspace.session.set_view(dict(body))
+    return workspace.state()
+
+
+def _undo(workspace: Workspace, _request: Request, _body: Any) -> Any:
+    workspace.session.undo()
+    return workspace.state()
+
+
+def _redo(workspace: Workspace, _request: Request, _body: Any) -> Any:
+    workspace.session.redo()
+    return workspace.state()
+
+
+def _expose(workspace: Workspace, _request: Request, _body: Any) -> Any:
+    workspace.screen.expose()
+    return workspace.state()
+
+
+def _rest(workspace: Workspace, _request: Request, _body: Any) -> Any:
+    workspace.screen.rest()
+
+
+def _picture(workspace: Workspace, _request: Request, _body: Any) -> Any:
+    sent = _jpeg(packed_pixels(workspace.screen))
+    sent.background = BackgroundTask(workspace.screen.fetched.set)
+    return sent
+
+
+def _move(workspace: Workspace, asked: Mapping[str, Any]) -> tuple[Callable[[Project], Project], int]:
+    """Return the change that a drag or playback requests, and the revision that it refers to."""
+    revision = int(asked.get("revision", workspace.session.revision))
+    if "at" in asked:
+        return partial(go_to, at_s=float(asked["at"])), revision
+    return partial(move_light, light=int(asked["light"]), x=float(asked["x"]), y=float(asked["y"])), revision
+
+
+def _moved(workspace: Workspace, asked: Mapping[str, Any]) -> Moved | None:
+    """Draw the project with a moved light, or at a time of its path."""
+    return workspace.drag.picture(*_move(workspace, asked))
+
+
+async def _follow(workspace: Workspace, socket: WebSocket) -> None:
+    """Answer requests of a drag: a line of JSON, then the picture.
+
+    A socket costs less per picture than requests. Of requests that come faster than pictures the newest is drawn; the
+    others get no picture. If the page closes during a drag, the drag ends: the project's own picture is restored,
+    unless a drag of another page is newer.
+    """
+    await socket.accept()
+    if workspace.following >= MOST_SOCKETS:
+        await socket.close(TRY_AGAIN)
+        return
+    workspace.following += 1
+    tasks: set[asyncio.Task[None]] = set()
+    waiting: dict[str, Any] | None = None
+
+    async def send(head: dict[str, Any], picture: bytes = b"") -> None:
+        # the tab may be closed by now
+        with suppress(RuntimeError, WebSocketDisconnect):
+            await socket.send_bytes(json.dumps(head).encode() + b"\n" + picture)
+
+    async def answer(asked: dict[str, Any]) -> None:
+        head: dict[str, Any] = {"number": asked.get("number")}
+        picture = b""
+        workspace.followed = socket
+        try:
+            found = await workspace.drags.run(partial(_moved, workspace, asked))
+            if found is not None:
+                picture = found.jpeg
+                head |= {"seconds": round(found.seconds, 4), "lights": [one.field_deg for one in found.project.lights]}
+        except Crowded:
+            head["error"] = CROWDED
+        except Exception as error:
+            head["error"] = _sentence(workspace, error)
+        await send(head, picture)
+
+    def begin(asked: dict[str, Any]) -> None:
+        task = asyncio.create_task(answer(asked))
+        tasks.add(task)
+        task.add_done_callback(ended)
+
+    def ended(task: asyncio.Task[None]) -> None:
+        nonlocal waiting
+        tasks.discard(task)
+        if waiting is not None:
+            asked, waiting = waiting, None
+            begin(asked)
+
+    try:
+        while True:
+            raw = await received(socket)
+            try:
+                asked = object_of(raw)
+            except ValueError as error:
+                await send({"number": None, "error": _sentence(workspace, error)})
+                continue
+            if len(tasks) < AT_ONCE:
+                begin(asked)
+                continue
+            stale, waiting = waiting, asked
+            if stale is not None:
+                await send({"number": stale.get("number")})
+    except WebSocketDisconnect:
+        pass
+    finally:
+        workspace.following -= 1
+        waiting = None
+        # wait for the picture in progress, which would otherwise interrupt the final one
+        with suppress(asyncio.CancelledError, Crowded):
+            await asyncio.gather(*tasks, return_exceptions=True)
+            if workspace.followed is socket:
+                workspace.followed = None
+                await workspace.changes.run(workspace.screen.rest)
+
+
+def _target(workspace: Workspace, request: Request, _body: Any) -> Any:
+    asked = request.query_params
+    if not asked.keys() & {"light", "at"}:
+        return _jpeg(queries.target_jpeg(workspace.screen))
+    found = workspace.drag.target(*_move(workspace, asked), held="held" in asked)
+    return Response(status_code=204) if found is None else _jpeg(found)
+
+
+def _pick(workspace: Workspace, request: Request, _body: Any) -> Any:
+    asked = request.query_params
+    return {"ghosts": list(queries.picked(workspace.screen, float(asked["u"]), float(asked["v"])))}
+
+
+def _outline(workspace: Workspace, request: Request, _body: Any) -> Any:
+    return Response(
+        queries.outline_png(workspace.screen, request.query_params["ghost"]), media_type="image/png", headers=_FRESH
+    )
+
+
+def _ghosts(workspace: Workspace, _request: Request, _body: Any) -> Any:
+    return ghost_rows(workspace.screen)
+
+
+def _section(workspace: Workspace, request: Request, _body: Any) -> Any:
+    drawn = diagrams.cross_section_diagram(workspace.session.project, request.query_params.get("ghost"))
+    return {"svg": drawn.svg, "reported": drawn.reported}
+
+
+def _coating(workspace: Workspace, request: Request, _body: Any) -> Any:
+    svg = diagrams.coating_svg(workspace.session.project, int(request.query_params["row"]))
+    return Response(svg, media_type="image/svg+xml", headers=_FRESH)
+
+
+def _colour_map(workspace: Workspace, request: Request, _body: Any) -> Any:
+    data = diagrams.colour_map(workspace.session.project, request.query_params["ghost"])
+    return Response(data, media_type="image/png", headers=_FRESH)
+
+
+def _mask(workspace: Workspace, _request: Request, _body: Any) -> Any:
+    return Response(diagrams.mask_png(workspace.session.project), media_type="image/png", headers=_FRESH)
+
+
+def _places(workspace: Workspace, _request: Request, _body: Any) -> Any:
+    return {"places": diagrams.ghost_places(workspace.session.project)}
+
+
+def _library(_workspace: Workspace, _request: Request, _body: Any) -> Any:
+    return {"lenses": list(diagrams.library()), "looks": list(diagrams.looks())}
+
+
+def _thumbnail(_workspace: Workspace, request: Request, _body: Any) -> Any:
+    return _jpeg(thumbnail(request.path_params["kind"], request.path_params["name"]))
+
+
+def _glasses(_workspace: Workspace, request: Request, _body: Any) -> Any:
+    from ...io.lens.glass_catalogue import all_names
+
+    words = request.query_params.get("q", "").lower().replace(" ", "")
+    names = [name for name in all_names() if words in name.lower().replace(" ", "")]
+
+    def far(name: str) -> tuple[bool, bool, str]:
+        # glasses with a matching beginning come first, with or without the maker's name or the N of new glasses
+        glass = name.lower().split(" ", 1)[-1]
+        forms = (glass, glass.removeprefix("n-"), name.lower().replace(" ", ""))
+        return glass != words, not any(form.startswith(words) for form in forms), name
+
+    names.sort(key=far)
+    return {"glasses": names[:40]}
+
+
+def _import(workspace: Workspace, request: Request, body: Any) -> Any:
+    asked = request.query_params
+    light = int(asked["light"]) if asked.get("light") else None
+    remarks = take_in(workspace.session, asked["name"], body, asked.get("as", ""), light)
+    return workspace.state() | {"reported": list(remarks)}
+
+
+def _open(workspace: Workspace, _request: Request, body: Any) -> Any:
+    workspace.session.open(str(body["text"]))
+    return workspace.state()
+
+
+def _save(workspace: Workspace, _request: Request, body: Any) -> Any:
+    path = workspace.session.save(str(body["text"]))
+    return workspace.state() | {"reported": f"Saved {path}"}
+
+
+def _command(workspace: Workspace, _request: Request, _body: Any) -> Any:
+    if workspace.session.file is None or not workspace.session.clean:
+        raise ProjectError("save the project first: the command renders the file")
+    return {"text": files.command_line(workspace.session.file, workspace.session.project)}
+
+
+def _export(workspace: Workspace, request: Request, _body: Any) -> Any:
+    kind, project = request.path_params["kind"], workspace.session.project
+    if kind not in files.SUFFIXES:
+        raise ProjectError(f"there is no export {kind!r}; known are {', '.join(files.SUFFIXES)}")
+    stem = Path(workspace.session.file).stem if workspace.session.file else "flare"
+    name = {"Content-Disposition": f'attachment; filename="{_plain(stem)}{files.SUFFIXES[kind]}"'}
+    if kind == "exr":
+        folder = Path(tempfile.mkdtemp(prefix="flarewright-"))
+        workspace.exports.add(folder)
+        path = folder / "flare.exr"
+
+        def progress(part: float, what: str) -> None:
+            if request.state.left.is_set():
+                raise Left
+            workspace.session.tell({"type": "export", "part": part, "what": what})
+
+        try:
+            files.export_picture(project, path, progress)
+        except BaseException:
+            workspace.drop_export(folder)
+            raise
+        return FileResponse(
+            path, headers=name, media_type="image/x-exr", background=BackgroundTask(workspace.drop_export, folder)
+        )
+    if kind == "png":
+        from ..preview.display_image import png
+
+        return Response(png(shown_pixels(workspace.screen)), media_type="image/png", headers=name)
+    if kind == "csv" and workspace.screen.seen is None:
+        raise ProjectError("the ghosts are still being measured; try again in a moment")
+    from ...io.project.project_file import project_text
+
+    if kind == "lens":
+        text = files.lens_text(project)
+    elif kind == "project":
+        text = project_text(project)
+    elif kind == "look":
+        text = files.look_of_project(project, stem)
+    else:
+        assert workspace.screen.seen is not None
+        text = ghost_csv(workspace.screen.seen)
+    return Response(text, media_type="text/plain; charset=utf-8", headers=name)
+
+
+def _plain(stem: str) -> str:
+    return "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "_" for c in stem) or "flare"
+
+
+def _seconds(body: Any) -> float:
+    return min(max(float(body.get("seconds", 30.0)), 1.0), MOST_SECONDS)
+
+
+def _solve(workspace: Workspace, _request: Request, body: Any) -> Any:
+    workspace.solver.start(_seconds(body))
+    return workspace.state()
+
+
+def _colors(workspace: Workspace, _request: Request, body: Any) -> Any:
+    workspace.solver.start_colors(str(body.get("kind", "quarter-wave")), _seconds(body))
+    return workspace.state()
+
+
+def _stop(workspace: Workspace, _request: Request, _body: Any) -> Any:
+    workspace.solver.stop()
+    return workspace.state()
+
+
+def _accept(workspace: Workspace, _request: Request, body: Any) -> Any:
+    reported = workspace.solver.accept(int(body["number"]))
+    return workspace.state() | {"reported": reported}
+
+
+def _candidate(workspace: Workspace, request: Request, _body: Any) -> Any:
+    found, k = workspace.solver.fitting.found, int(request.path_params["k"])
+    if not 0 <= k < len(found):
+        raise ProjectError(f"there is no lens {k} among those found")
+    return _jpeg(found[k].picture)
+
+
+_FRESH = {"Cache-Control": "no-store"}
+
+
+def _jpeg(data: bytes) -> Response:
+    return Response(data, media_type="image/jpeg", headers=_FRESH)
+
+
+_GET = {
+    "/api/state": _state, "/api/picture": _picture, "/api/target": _target,
+    "/api/pick": _pick, "/api/outline": _outline, "/api/ghosts": _ghosts, "/api/section": _section,
+    "/api/coating": _coating, "/api/map": _colour_map, "/api/mask": _mask,
+    "/api/places": _places, "/api/library": _library,
+    "/api/thumbnail/{kind}/{name}": _thumbnail, "/api/glasses": _glasses, "/api/command": _command,
+    "/api/export/{kind}": _export, "/api/candidate/{k}": _candidate,
+}  # fmt: skip
+_POST = {
+    "/api/do": _do, "/api/view": _view, "/api/undo": _undo, "/api/redo": _redo, "/api/expose": _expose,
+    "/api/rest": _rest, "/api/import": _import, "/api/open": _open, "/api/save": _save, "/api/solve": _solve,
+    "/api/colors": _colors, "/api/stop": _stop, "/api/accept": _accept,
+}  # fmt: skip
+
+
+async def _index(_request: Request) -> Response:
+    return FileResponse(STATIC / "index.html", headers=_FRESH)
+
+
+def make_app(workspace: Workspace, access: Access) -> Starlette:
+    """Return the ASGI application of a workspace.
+
+    Parameters
+    ----------
+    workspace : Workspace
+    access : Access
+
+    Returns
+    -------
+    Starlette
+    """
+    file = [Middleware(RequestBodyLimitMiddleware, max_body_size=MOST_BYTES)]
+    routes: list[Any] = [Route("/", _index)]
+    routes += [Route(path, reported(work)(workspace), methods=["GET"]) for path, work in _GET.items()]
+    routes += [
+        Route(path, reported(work)(workspace), methods=["POST"], middleware=file if path == IMPORT else None)
+        for path, work in _POST.items()
+    ]
+    routes += [WebSocketRoute("/ws", workspace.socket), WebSocketRoute("/ws/moving", partial(_follow, workspace))]
+    routes += [Mount("/static", StaticFiles(directory=STATIC))]
+    return Starlette(
+        routes=routes,
+        middleware=[
+            Middleware(SafeHeaders),
+            Middleware(Guard, access=access),
+            # a website cannot reach the editor through its own domain name, even with the cookie
+            Middleware(TrustedHostMiddleware, allowed_hosts=access.hosts, www_redirect=False),
+        ],
+        exception_handlers={HTTPException: _refused},
+        max_body_size=MOST_BODY,
+    )
+
+
+def serve(workspace: Workspace, access: Access, port: int, ready: Callable[[int], None]) -> bool:
+    """Serve until Ctrl-C, or another request to end.
+
+    Parameters
+    ----------
+    workspace : Workspace
+    access : Access
+    port : int
+        0: any free port.
+    ready : callable
+        Called with the port when the page can be opened.
+
+    Returns
+    -------
+    bool
+        Whether a signal ended it. Pictures in progress may still occupy threads then.
+
+    Raises
+    ------
+    ProjectError
+        When the port is taken.
+    """
+    import socket
+
+    import uvicorn
+
+    host = access.host
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as place:
+        place.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            place.bind((host, port))
+        except OSError as error:
+            why = (error.strerror or str(error)).lower()
+            taken = error.errno in (errno.EADDRINUSE, errno.EACCES)
+            remedy = "choose another --port, or 0 for any that is free" if taken else "check --host"
+            raise ProjectError(f"the editor cannot listen on {host}:{port} ({why}); {remedy}") from None
+        # connections wait from now on until the server runs
+        place.listen(128)
+        workspace.screen.start()
+
+        class Server(uvicorn.Server):
+            async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+                # first of all, so that drawing leaves the processor to the end
+                workspace.end_work()
+                await super().shutdown(sockets)
+
+        server = Server(uvicorn.Config(make_app(workspace, access), **SERVER))
+        with _ended_by_signals(server) as signals:
+            ready(place.getsockname()[1])
+            server.run([place])
+            workspace.close()
+    return bool(signals)
+
+
+@contextmanager
+def _ended_by_signals(server: Any) -> Iterator[list[int]]:
+    """End the server at Ctrl-C, SIGTERM and a closed terminal; collect the signals.
+
+    The server passes a signal on after its end, when the autosave is not written yet, so it must not end the process.
+    """
+    seen: list[int] = []
+
+    def end(number: int, _frame: object) -> None:
+        seen.append(number)
+        server.should_exit = True
+
+    if threading.current_thread() is not threading.main_thread():
+        yield seen
+        return
+    known = [signal.SIGINT, signal.SIGTERM, *([] if sys.platform == "win32" else [signal.SIGHUP])]
+    before = {number: signal.signal(number, end) for number in known}
+
+    def is_running(_record: object) -> bool:
+        # answers that the end cuts off are no faults
+        return not server.should_exit
+
+    log = logging.getLogger("uvicorn.error")
+    log.addFilter(is_running)
+    try:
+        yield seen
+    finally:
+        log.removeFilter(is_running)
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,15 @@
+"""The open project of the editor: history, files, view settings and autosave.
+
+Public entry points: `session.begin`, `session.Session`.
+
+- `session`: `Session` holds history, view and file; `begin` starts or resumes one
+- `history`: `History`, undo and redo
+- `files`: open, import, save and export
+- `autosave`: the history on disk, to resume after a crash
+- `autosave_lock`: `AutosaveWriter` writes it on a thread and locks it against other editors
+- `view_settings`: `View`, settings of the screen
+- `measured_project`: projects of measured flares
+- `reach`: `Reach`, the files that the page may open and save
+- `image_files`: pictures that a project reads, and messages on missing ones
+- `input_notes`: messages on clamped input
+"""

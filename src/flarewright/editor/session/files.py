@@ -1,0 +1,310 @@
+"""Open, import, save and export files of the editor."""
+
+from __future__ import annotations
+
+import hashlib
+import shlex
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import atan, degrees
+from pathlib import Path
+
+from ... import __version__
+from ...errors import FlarewrightError, LensError, OutputError, ProjectError
+from ...io.files.atomic_write import write_atomically
+from ...io.files.door import expanded, outside
+from ...io.files.file_kind import kind_of
+from ...io.files.text_file import read_toml
+from ...io.images.exr import write_exr
+from ...io.images.half import exr_scale
+from ...io.lens.lens_writer import format_lens
+from ...io.lens.library import lens_path, library_names, near_names
+from ...io.measurement.ghost_model_file import is_ghost_model_file
+from ...io.project.look_file import look_text, read_look
+from ...io.project.project_file import project_from_data, project_text, read_project
+from ...io.project.project_text import LENS_SUFFIXES
+from ...measure.replay.measured_project import is_measured, render_any, with_sensor
+from ...model import Camera, Iris, Lens, Light, Look, Project
+from ...render.scene.looks import look_of
+from ...render.scene.photographic_defaults import as_photographed
+from ...render.scene.resolve import first_order, open_lens
+from ...typing import Progress
+from ..commands.lens import first_coating, own_lens
+from .image_files import pictures
+from .measured_project import check_any, project_for_measured
+
+SAMPLE = "takumar-50-f1.4"
+SAMPLE_DEG = (-9.0, 5.0)
+# defaults of a new project: image position of the light, and stops below wide open for the user's own lenses
+PLACE_MM = (10.5, 5.6)
+F_NUMBER = 8.0
+PICTURES = (".exr", ".png", ".jpg", ".jpeg")
+SUFFIXES: dict[str, str] = {
+    "exr": ".exr", "png": ".png", "lens": ".lens.toml", "project": ".toml", "look": ".look.toml", "csv": ".csv",
+}  # fmt: skip
+
+
+def sample_project() -> Project:
+    """Return the project of the first start: the picture of the README."""
+    base = project_for_lens(SAMPLE)
+    shown: Project = base.replace(lights=(base.lights[0].replace(field_deg=SAMPLE_DEG),))
+    return shown
+
+
+def project_for_lens(lens: str | Lens) -> Project:
+    """Return a project with a lens and a light in the picture's upper right; library lenses get photographic settings.
+
+    The iris has six blades if the lens defines none.
+    """
+    known = open_lens(lens).lens
+    iris = known.iris if known.iris != Iris() else Iris(blades=6)
+    efl = first_order(known).efl
+    x, y = (round(degrees(atan(mm / efl)), 3) for mm in PLACE_MM)
+    plain = Project(
+        lens=lens, iris=iris, coating=first_coating(known), f_number=max(known.f_number, F_NUMBER),
+        lights=(Light(field_deg=(x, y)),), camera=Camera(size_px=(1920, 1080), desqueeze=known.squeeze is not None),
+    )  # fmt: skip
+    return as_photographed(plain)[0]
+
+
+def look_of_project(project: Project, name: str) -> str:
+    """Return the look of a project as the text of a look file."""
+    look, _ = look_of(project, name.replace("-", " ").replace("_", " ").capitalize())
+    return look_text(look)
+
+
+def _any_project(_project: Project) -> None:
+    """Allow every project."""
+
+
+def open_any(text: str, allowed: Callable[[Project], None] = _any_project) -> tuple[Project, str | None]:
+    """Open a project file, a lens file, a measured flare, or a shipped lens by its name.
+
+    Parameters
+    ----------
+    text : str
+    allowed : callable
+        Raises an error if the files that a project names may not be read.
+
+    Returns
+    -------
+    project : Project
+    file : str or None
+        The project file, for saving.
+
+    Raises
+    ------
+    FlarewrightError
+        When it is none of these.
+    """
+    path = expanded(text)
+    if path.suffix.lower() == ".toml" and path.is_file() and _is_project(read_toml_of(path)):
+        project = read_project(path)
+        allowed(project)
+        check_any(project)
+        return with_sensor(project) if is_measured(project) else project, str(path.resolve())
+    if is_ghost_model_file(str(path)):
+        return project_for_measured(str(path.resolve())), None
+    found = lens_path(text)
+    name = found.stem if found.stem in library_names() and not path.exists() else str(path.resolve())
+    return project_for_lens(name), None
+
+
+def opened(text: str, allowed: Callable[[Project], None] = _any_project) -> tuple[Project, str | None]:
+    """Open a path or name from the page: as `open_any`, with messages in the page's words.
+
+    Parameters
+    ----------
+    text : str
+    allowed : callable
+        As of `open_any`.
+
+    Returns
+    -------
+    project : Project
+    file : str or None
+
+    Raises
+    ------
+    FlarewrightError
+        When it is neither a project, a lens file nor a shipped lens.
+    """
+    text = text.strip()
+    path = expanded(text)
+    try:
+        return open_any(text, allowed)
+    except LensError as error:
+        if path.exists():
+            raise LensError(_without_commands(str(error))) from None
+    near = () if path.suffix or path.parent != Path() else near_names(text)
+    hint = f"did you mean {' or '.join(near)}?" if near else "the panel Library shows every lens"
+    raise LensError(
+        f"there is no file and no lens {text!r}: {hint}{'' if near else '; a file is found by its whole path'}"
+    )
+
+
+def _without_commands(words: str) -> str:
+    """Remove hints that only help in a terminal."""
+    return words.replace(" (flarewright lenses lists them)", " of the panel Library")
+
+
+def read_toml_of(path: Path) -> dict[str, object]:
+    """Read TOML; raise a one-sentence error if it is invalid."""
+    try:
+        return read_toml(path, "a project or lens file")
+    except ValueError as error:
+        raise ProjectError(str(error)) from None
+
+
+def _is_project(data: dict[str, object]) -> bool:
+    return "lights" in data or "lens" in data
+
+
+@dataclass(frozen=True)
+class Imported:
+    """Content of a dropped file: a project, look, lens or picture (path), and remarks."""
+
+    project: Project | None = None
+    look: Look | None = None
+    lens: Lens | None = None
+    picture: str | None = None
+    remarks: tuple[str, ...] = ()
+
+
+def imported(
+    name: str, data: bytes, folder: Path, allowed: Callable[[Project], None] = _any_project
+) -> Imported:  # fmt: skip
+    """Import a file dropped on the page.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file; its suffix determines its kind.
+    data : bytes
+    folder : Path
+        Folder for pictures, which are read again later.
+    allowed : callable
+        As of `open_any`.
+
+    Returns
+    -------
+    Imported
+
+    Raises
+    ------
+    FlarewrightError
+        When the editor cannot read the file; the message names the readable kinds.
+    """
+    suffix = Path(name).suffix.lower()
+    plain = Path(name).name or "dropped"
+    if suffix not in (*LENS_SUFFIXES, *PICTURES):
+        raise LensError(
+            f"{plain} cannot be opened here: drop a lens (.toml, .lens, .zmx), a measured flare (.json), a project or "
+            "a look (.toml), or a background picture (.exr, .png, .jpg)"
+        )
+    # a new file name for new contents, so that undo finds the old picture
+    folder = folder / hashlib.sha256(data).hexdigest()[:12]
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / plain
+    write_atomically(path, lambda temporary: _write_bytes(temporary, data))
+    if suffix in PICTURES:
+        return Imported(picture=str(path))
+    try:
+        if suffix == ".toml":
+            table = read_toml_of(path)
+            if kind_of(table) == "look":
+                return Imported(look=read_look(path))
+            if _is_project(table):
+                found = project_from_data(table, folder=folder, where=plain)
+                allowed(found)
+                check_any(found)
+                for image in pictures(found):
+                    if Path(image.path).parent == folder and not Path(image.path).is_file():
+                        raise ProjectError(f"{image.path} does not exist")
+                return Imported(project=found)
+        if is_ghost_model_file(str(path)):
+            return Imported(project=project_for_measured(str(path)))
+        opened = open_lens(path)
+    except FlarewrightError as error:
+        # hide the internal folder from the message
+        words = _without_commands(str(error)).replace(str(path), plain)
+        if str(folder) in words:
+            words = f"{plain}: {words.replace(f'{folder}/', '')}; a dropped file comes alone, so use Open for this one"
+        raise type(error)(words) from None
+    return Imported(lens=opened.lens.replace(name=opened.lens.name or plain), remarks=opened.remarks)
+
+
+def _write_bytes(path: Path, data: bytes) -> None:
+    path.write_bytes(data)
+
+
+def project_path(text: str) -> Path:
+    """Return the path of a project file; `.toml` is added if missing."""
+    if not text.strip():
+        raise OutputError("the project needs a file name, like shot.toml")
+    path = expanded(text.strip())
+    return (path if path.suffix.lower() == ".toml" else path.with_name(f"{path.name}.toml")).resolve()
+
+
+def stamp_of(path: str | Path) -> str | None:
+    """Return a hash of a file's contents; None if it cannot be read."""
+    try:
+        with outside(path, "a project file") as file:
+            return _stamp(file.read())
+    except FlarewrightError:
+        return None
+
+
+def _stamp(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def save_project(
+    project: Project, path: Path, *, look: Callable[[], object] | None = None, replace: bool = True
+) -> str:
+    """Write a project file.
+
+    Parameters
+    ----------
+    project : Project
+    path : Path
+    look, replace
+        As in `io.files.atomic_write.write_atomically`.
+
+    Returns
+    -------
+    str
+        Stamp of the written contents; other programs may have changed the file since.
+
+    Raises
+    ------
+    OutputError
+        When it cannot be written.
+    FileExistsError
+        When a file exists there that must not be replaced.
+    """
+    data = project_text(project, folder=path.parent).encode()
+    write_atomically(path, lambda temporary: _write_bytes(temporary, data), look=look, replace=replace)
+    return _stamp(data)
+
+
+def command_line(file: str, project: Project) -> str:
+    """Return the command that renders a saved project."""
+    stem = Path(file).with_suffix("")
+    quality = " --quality final" if project.quality.mode == "draft" else ""
+    return f"flarewright render --project {shlex.quote(file)}{quality} -o {shlex.quote(f'{stem}.exr')}"
+
+
+def export_picture(project: Project, path: Path, progress: Progress | None = None) -> None:
+    """Render a project at its size and quality into an EXR with layers."""
+    rendering = render_any(project, progress=progress, limit=True)
+    write_exr(
+        path, rendering.layers, project.camera.size_px, pixel_type=project.output.pixel_type,
+        scale=exr_scale(project), metadata={"version": __version__, "project": project_text(project)},
+        pixel_aspect=rendering.project.camera.pixel_aspect, colorspace=project.output.colorspace,
+    )  # fmt: skip
+
+
+def lens_text(project: Project) -> str:
+    """Return the project's lens as a lens file."""
+    return format_lens(own_lens(project))

@@ -1,0 +1,81 @@
+"""Atomic file writing: a file is complete or absent."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from collections.abc import Callable
+from pathlib import Path
+
+from flarewright.errors import OutputError
+
+
+def write_atomically(
+    path: str | Path, write: Callable[[Path], None], *, look: Callable[[], object] | None = None, replace: bool = True
+) -> None:
+    """Write a file under a temporary name in the same folder, then rename it.
+
+    Parameters
+    ----------
+    path : str or Path
+        Target path; an existing file is replaced only when the new one is complete.
+    write : callable
+        Gets the temporary path (same folder, same suffix) and writes the whole file there.
+    look : callable, optional
+        Called after `write`, right before the rename: the last chance to detect a file of another process at `path`.
+        An exception that it raises leaves that file unchanged.
+    replace : bool
+        False: write only if no file exists at `path`. A file that another process creates meanwhile is kept if the
+        file system supports hard links.
+
+    Raises
+    ------
+    FileExistsError
+        When a file exists that must not be replaced.
+    OutputError
+        When the folder is missing, read-only or full, or `path` is a folder; no partial file remains.
+
+    Notes
+    -----
+    All other exceptions of `write` propagate after the temporary file is removed.
+    """
+    target = Path(path)
+    if target.is_dir():
+        raise OutputError(f"cannot write {target}: it is a folder; give a file name")
+    if not target.parent.is_dir():
+        raise OutputError(f"cannot write {target}: the folder {target.parent} does not exist; create it first")
+    temporary = target.with_name(f".{target.stem[:100]}.{secrets.token_hex(4)}.part{target.suffix}")
+    try:
+        write(temporary)
+        if not temporary.is_file():
+            raise OutputError(f"cannot write {target}: nothing was written; check the free space and the permissions")
+        if look is not None:
+            look()
+        _place(temporary, target, replace)
+    except OSError as error:
+        if isinstance(error, FileExistsError) and not replace:
+            raise
+        reason = error.strerror or str(error) or type(error).__name__
+        raise OutputError(
+            f"cannot write {target}: {reason.lower()}; check the free space and the permissions"
+        ) from error
+    except UnicodeEncodeError as error:
+        raise OutputError(f"cannot write {target}: the name of a file in it is not UTF-8; rename that file") from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def _place(temporary: Path, target: Path, replace: bool) -> None:
+    if not replace:
+        try:
+            # unlike a rename, a link never replaces a file
+            os.link(temporary, target)
+            return
+        except FileExistsError:
+            raise
+        except OSError:
+            if target.exists():
+                raise FileExistsError(target) from None
+    os.replace(temporary, target)

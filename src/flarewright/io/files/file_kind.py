@@ -1,0 +1,86 @@
+"""Kind of a TOML file of ours, for error messages about a file given instead of another kind."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any, Literal
+
+Kind = Literal["lens", "look", "project", "scene"]
+
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+
+
+def refuse_other_kind(path: str | Path, table: dict[str, Any], wanted: Kind) -> None:
+    """Raise an error when a file is clearly of another kind than the wanted one.
+
+    Parameters
+    ----------
+    path : str or Path
+    table : dict
+        Its parsed contents.
+    wanted : {"lens", "look", "project", "scene"}
+
+    Raises
+    ------
+    ValueError
+        With the command to use instead; the message is one sentence.
+    """
+    kind = kind_of(table)
+    if kind == "look" != wanted:
+        raise ValueError(
+            f"{path} is a look, not a {wanted} file: apply it to a lens with flarewright render LENS --light X,Y "
+            f"--look {path}"
+        )
+    if kind is not None and kind != wanted:
+        use = f", render it with flarewright render --project {path}" if kind == "project" else ""
+        raise ValueError(
+            f"{path} is a {kind} file, not a {wanted} file: check it with flarewright {kind} check {path}{use}"
+        )
+
+
+def refuse_lens_suffix(path: str | Path, wanted: Kind) -> None:
+    """Raise ValueError when the suffix is that of another program's lens file, which is not TOML."""
+    if Path(path).is_file() and Path(path).suffix.lower() in (".lens", ".zmx"):
+        raise ValueError(f"{path} is a lens file, not a {wanted} file: check it with flarewright lens check {path}")
+
+
+def kind_of(table: dict[str, Any]) -> Kind | None:
+    """Return the kind of a file by its keys; None when they are ambiguous or contradictory."""
+    kinds: list[Kind] = []
+    if isinstance(table.get("rows"), list) and "lights" not in table:
+        kinds.append("lens")
+    if "lens" in table and "rows" not in table:
+        # a project has no name
+        kinds.append("look" if "name" in table else "project")
+    if "cameras" in table:
+        kinds.append("scene")
+    return kinds[0] if len(kinds) == 1 else None
+
+
+def foreign_hint(text: str) -> str:
+    """Return what a text file of another program is, with the remedy; "" for any other text.
+
+    Parameters
+    ----------
+    text : str
+        Contents of the file, or their beginning.
+
+    Returns
+    -------
+    str
+        The predicate of a sentence that begins with the file's name.
+    """
+    start = text[:20000]
+    if start.lstrip().startswith("{") and '"lens_elements"' in start:
+        return (
+            "is a lens of RealFlare (JSON), which Flarewright does not read: write its lens_elements as rows of a lens "
+            "file (docs/lens-file.md)"
+        )
+    lines = [line.split() for line in start.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    if len(lines) >= 3 and all(len(words) == 4 and all(map(_NUMBER.fullmatch, words)) for words in lines[:12]):
+        return (
+            "is a lens table of pbrt (radius, thickness, index, aperture diameter), which Flarewright does not read: "
+            "write its lines as rows of a lens file (docs/lens-file.md)"
+        )
+    return ""

@@ -1,0 +1,221 @@
+"""Error sentences for invalid input, shared by all readers."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable
+from datetime import date, time
+from typing import Any, cast
+
+from pydantic import BaseModel, ValidationError
+
+Keys = list[int | str]
+"""Path of a value in a file: ["lights", 0, "field_deg"]."""
+Finding = dict[str, Any]
+"""One error of pydantic: type, loc, msg, input and ctx."""
+
+_NUMBER, _INTEGER, _TEXT, _LIST, _TABLE = "a number", "a whole number", "a text in quotes", "a list", "a table"
+_TIME = "a date with a time and its zone, like 2024-06-21T18:00:00+02:00"
+
+# expected value by pydantic's error type; other types state their bound in the message
+_EXPECTED = {
+    "bool_type": "true or false", "bool_parsing": "true or false",
+    "int_type": _INTEGER, "int_parsing": _INTEGER, "int_from_float": _INTEGER,
+    "int_parsing_size": "a whole number of fewer digits",
+    "float_type": _NUMBER, "float_parsing": _NUMBER, "finite_number": "a finite number",
+    "string_type": _TEXT, "string_unicode": _TEXT, "string_too_short": "a text that is not empty",
+    "string_pattern_mismatch": "two rows like 7-3",
+    "tuple_type": _LIST, "list_type": _LIST, "set_type": _LIST, "frozen_set_type": _LIST,
+    "dict_type": _TABLE, "model_type": _TABLE, "model_attributes_type": _TABLE, "mapping_type": _TABLE,
+    "none_required": "left out",
+    "datetime_type": _TIME, "datetime_parsing": _TIME, "datetime_from_date_parsing": _TIME,
+    "datetime_object_invalid": _TIME, "timezone_naive": _TIME,
+}  # fmt: skip
+
+_BOUNDS = {
+    "greater_than": ("greater than", "gt"), "greater_than_equal": ("greater than or equal to", "ge"),
+    "less_than": ("less than", "lt"), "less_than_equal": ("less than or equal to", "le"),
+}  # fmt: skip
+
+_LONGEST_KEY = 100
+
+# exact lengths of places, sizes and colours; longer limits are upper bounds
+_FIXED_LENGTHS = (2, 3)
+
+# lists whose entries have separate headings in TOML
+_HEADINGS = {
+    "lights": "[[lights]]", "cameras": "[[cameras]]", "rules": "[[art.rules]]",
+    "ghost_targets": "[[design.ghost_targets]]",
+}  # fmt: skip
+
+
+def validation_sentences(
+    error: ValidationError,
+    data: Any = None,
+    unknown: Callable[[Keys], str] = lambda _: "",
+) -> list[str]:
+    """Turn a pydantic ValidationError into sentences for the user; the only place that reads pydantic's messages.
+
+    Parameters
+    ----------
+    error : ValidationError
+    data : object, optional
+        The validated data; names places as the file does. None: names of the record's fields.
+    unknown : callable, optional
+        Returns a suggestion for an unknown key.
+
+    Returns
+    -------
+    list of str
+        One entry per place and error: "iris.blades should be a whole number, not 'six'".
+    """
+    # expected values by place: in a union each member reports a separate error
+    found: dict[tuple[str, str], list[str]] = {}
+    for finding in cast(list[Finding], error.errors(include_url=False)):
+        if finding["type"] == "too_short" and finding.get("ctx", {}).get("actual_length") != len(finding["input"]):
+            continue  # its items have separate errors
+        keys = list(finding["loc"]) if data is None else _keys_in_file(finding["loc"], data, finding["type"])
+        where = key_place(keys)
+        match finding["type"]:
+            case "missing":
+                heading = _HEADINGS.get(str(keys[-1]))
+                remedy = f": add at least one {heading}" if heading else ""
+                found.setdefault((f"{where} is missing{remedy}", ""), [])
+            case "extra_forbidden":
+                found.setdefault((f"{where} is not a known key{unknown(keys)}", ""), [])
+            case "value_error":
+                reason = finding["msg"].removeprefix("Value error, ")
+                found.setdefault((f"{where}: {reason}" if where else reason, ""), [])
+            case _:
+                choices = found.setdefault((where, _given_text(finding)), [])
+                choices += [wanted for wanted in (_expected_text(finding, keys),) if wanted not in choices]
+    return [
+        f"{start} should be {' or '.join(choices)}{given}".strip() if choices else start
+        for (start, given), choices in found.items()
+    ]
+
+
+def _expected_text(finding: Finding, keys: Keys) -> str:
+    """Return the description of the expected value."""
+    kind, about = finding["type"], finding.get("ctx", {})
+    if kind in _BOUNDS:
+        words, name = _BOUNDS[kind]
+        bound = about[name]
+        # %g, because 1e9 is easier to read than ten digits
+        return f"{words} {f'{bound:g}' if isinstance(bound, float) else bound}"
+    match kind:
+        case "tuple_type" if keys and keys[-1] in _HEADINGS:
+            return f"tables, each under {_HEADINGS[str(keys[-1])]}"
+        case "too_short":
+            return f"a list of at least {about['min_length']}"
+        case "too_long":
+            return f"a list of {'' if about['max_length'] in _FIXED_LENGTHS else 'at most '}{about['max_length']}"
+        case "literal_error":
+            return str(about["expected"])
+        case "union_tag_invalid":
+            return f"a table whose {_tag(about)} is {' or '.join(str(about['expected_tags']).rsplit(', ', 1))}"
+        case "union_tag_not_found":
+            return f"a table that begins with its {_tag(about)}"
+    return _EXPECTED.get(kind, "something else")
+
+
+def _tag(about: dict[str, Any]) -> str:
+    return str(about["discriminator"]).strip("'")
+
+
+def _given_text(finding: Finding) -> str:
+    """Return a description of the given value, or "" when it does not help."""
+    value = finding["input"]
+    match finding["type"]:
+        case "too_short" | "too_long":
+            return f", not {len(value)}"
+        case "union_tag_invalid":
+            return f", not {shorten(value[_tag(finding['ctx'])])}"
+        case "union_tag_not_found" if isinstance(value, dict):
+            return ""
+    if isinstance(value, BaseModel):
+        return ""
+    if isinstance(value, dict):
+        return ", not a table"
+    return ", not a list" if isinstance(value, list | tuple) else f", not {shorten(value)}"
+
+
+def _keys_in_file(loc: tuple[int | str, ...], data: Any, kind: str) -> Keys:
+    """Remove union tags, which pydantic inserts and the file does not contain, from a path."""
+    keys: Keys = []
+    for position, key in enumerate(loc):
+        if isinstance(data, BaseModel):
+            data = dict(data)
+        if (isinstance(data, dict) and key in data) or (
+            isinstance(data, list | tuple) and isinstance(key, int) and key < len(data)
+        ):
+            keys.append(key)
+            data = data[cast(Any, key)]
+        elif kind == "missing" and position == len(loc) - 1:
+            keys.append(key)
+    return keys
+
+
+def key_place(keys: Keys) -> str:
+    """Return a path in a file as text: "lights[0].field_deg"."""
+    text = ""
+    for key in keys:
+        part = f"[{key}]" if isinstance(key, int) else f".{key}" if text else key
+        text += part if len(part) <= _LONGEST_KEY else f"{part[:_LONGEST_KEY]} ..."
+    return text
+
+
+def written(value: object) -> str:
+    """Return a value as the file spells it: `true`, `2024-06-21`, `{ a = 1 }`, `null`."""
+    match value:
+        case None:
+            return "null"
+        case bool():
+            return "true" if value else "false"
+        case float() if float(short := f"{value:g}") == value:
+            # 1e+09, not ten digits
+            return short
+        case date() | time():
+            return value.isoformat()
+        case list() | tuple():
+            return f"[{', '.join(map(written, value))}]"
+        case dict():
+            return f"{{ {', '.join(f'{key} = {written(item)}' for key, item in value.items())} }}" if value else "{}"
+    return repr(value)
+
+
+def shorten(value: object) -> str:
+    """Return a value as `written`, cut in the middle to 60 characters."""
+    text = written(value)
+    return text if len(text) <= 60 else f"{text[:48]} ... {text[-6:]}"
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return '; did you mean "x"?' for a misspelt word, or nothing."""
+    # a cutoff of 0.6 would suggest "holdout" for "colour"
+    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.65)
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def count(number: int, noun: str, plural: str | None = None) -> str:
+    """Return "1 row" or "3 rows"."""
+    return f"{number} {noun if number == 1 else plural or noun + 's'}"
+
+
+def summary(where: str, problems: list[str]) -> str:
+    """Return one sentence on the problems of a file.
+
+    Parameters
+    ----------
+    where : str
+        The file's name.
+    problems : list of str
+        At least one.
+
+    Returns
+    -------
+    str
+    """
+    if len(problems) == 1:
+        return f"{where}: {problems[0]}"
+    return f"{where} has {count(len(problems), 'problem')}, the first: {problems[0]}"

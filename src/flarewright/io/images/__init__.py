@@ -1,0 +1,14 @@
+"""Image files: EXR, PNG, photographs, and the images that projects refer to.
+
+- `contact_sheet`: `write_contact_sheet`, small pictures on one page and in one picture
+- `exr`: `write_exr` and `read_exr` for layers; `read_exr_plane`, `read_exr_colour` for any EXR file
+- `half`: `exr_scale`, `rounded_to_half`, scale and rounding of half floats
+- `height_image`: `read_heights`, figure errors of surfaces
+- `html_page`: `html_page`, pages and sections of pages from templates
+- `mask_image`: `read_mask`, iris and dirt images; `read_grey`
+- `photo`: `open_photo`, photographs with linear values (RAW, TIFF, EXR, NPY); `photo_facts`, their EXIF tags
+- `picture`: `read_picture`, any colour picture as linear RGB; `decode_srgb`
+- `plate_image`: `read_matte` and `read_depth`, holdouts
+- `png`: `write_png`, `encode_png`, `png_address`
+- `thumbnails`: `thumbnail`, precomputed pictures of the library
+"""

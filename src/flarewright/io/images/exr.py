@@ -1,0 +1,427 @@
+"""OpenEXR files: layers as parts, the project in the metadata.
+
+`write_exr` and `read_exr` are for our own files; `read_exr_plane` and `read_exr_colour` read files of other programs.
+
+Every program opens the first part: the first layer (the beauty) with plain channels R, G, B. Each further layer is a
+separate part, named after the layer, with channels `layer.R`, `layer.G`, `layer.B`; compositing programs list it
+under its name whether they read parts or channel names. A file with one layer is an ordinary single-part file. Pixels
+are linear and scene-referred; `chromaticities` states the primaries.
+
+A file of half floats stores values times a power of two (`half.half_scale`), recorded in each part's attribute
+`flarewright.scale`. A layer with values above half's range has 32-bit channels, rounded to half's precision and
+compressed by PXR24. PXR24 keeps 16 bits of each value, which suffices here; such a layer is about a quarter larger than
+one of half floats (with ZIP about twice as large). The read functions here divide by the scale.
+
+Parts of single ghosts cover only their data window, which keeps files of small ghosts small. Wide open, most ghosts
+fill the picture and 351 of them make large files; `--brightest` limits them. Nuke, Fusion, Natron and OpenImageIO place
+such a part correctly; Blender (up to 5 at least) puts it into the picture's corner. For Blender, `full_windows=True`
+writes every layer at the size of the picture.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import frexp, inf
+from os import PathLike
+from pathlib import Path
+from threading import Lock
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import FileError, FlarewrightError, OutputError
+from ...model.layer import Layer
+from ...model.project.camera import Colorspace
+from ...typing import Floats, Pixels
+from ..files.atomic_write import write_atomically
+from ..files.door import outside, printable, sentences_for, shown
+from ..files.silence_libraries import silenced
+from .half import HALF_MAX, half_scale, rounded_to_half
+
+# (red x, y, green x, y, blue x, y, white x, y): ITU-R BT.709-6 table 3; ACEScg as S-2014-004, AP1 with the ACES white.
+CHROMATICITIES: Mapping[Colorspace, tuple[float, ...]] = {
+    "rec709": (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290),
+    "acescg": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
+}
+
+# Names of the ASWF Color Interop Forum for the same two spaces.
+_INTEROP_ID: Mapping[Colorspace, str] = {"rec709": "lin_rec709_scene", "acescg": "lin_ap1_scene"}
+
+_PREFIX = "flarewright."
+_SCALE = f"{_PREFIX}scale"
+_CHANNELS = "RGB"
+
+# the library prints errors to stdout; redirecting stdout affects all threads
+_REDIRECT_LOCK = Lock()
+
+
+@dataclass(frozen=True)
+class ExrContents:
+    """Contents of a file, from `read_exr`.
+
+    Attributes
+    ----------
+    layers : tuple of Layer
+        In the order of the file; pixels as float32 within each part's data window, scale removed.
+    size_px : tuple of int
+        Width and height of the display window.
+    pixel_type : {"half", "float"}
+        Of the first part; "float" in a file of half floats when its values exceed half's range.
+    metadata : dict of str to str
+        As passed to `write_exr`.
+    header : dict of str to object
+        All attributes of the first part.
+    scale : float
+        Factor of the first part's values in the file.
+    """
+
+    layers: tuple[Layer, ...]
+    size_px: tuple[int, int]
+    pixel_type: Literal["half", "float"]
+    metadata: dict[str, str]
+    header: dict[str, Any] = field(default_factory=dict)
+    scale: float = 1.0
+
+
+def write_exr(
+    path: str | PathLike[str],
+    layers: Sequence[Layer],
+    size_px: tuple[int, int],
+    *,
+    pixel_type: Literal["half", "float"] = "half",
+    scale: float | None = None,
+    metadata: Mapping[str, str] | None = None,
+    pixel_aspect: float = 1.0,
+    colorspace: Colorspace = "rec709",
+    full_windows: bool = False,
+) -> tuple[str, ...]:
+    """Write layers into one EXR file, atomically.
+
+    Parameters
+    ----------
+    path : path
+    layers : sequence of Layer
+        The first one becomes the part that every program opens.
+    size_px : tuple of int
+        Width and height of the whole picture.
+    pixel_type : {"half", "float"}
+        half: 16 bits per value; layers with values above half's range use 32 bits with half's precision; variances
+        always use 32 bits.
+    scale : float, optional
+        Power of two that multiplies all values (variances: its square): `exr_scale(project)`. None: 1024 for half
+        floats, which suits lights of intensity 1 and keeps brighter ones without loss; 1 for floats.
+    metadata : mapping of str to str, optional
+        Stored in the first part's header, each name prefixed by "flarewright.".
+    pixel_aspect : float
+        Width of a pixel over its height.
+    colorspace : {"rec709", "acescg"}
+        Primaries of the pixels; the function converts nothing.
+    full_windows : bool
+        Write single ghosts at the size of the picture as well (for Blender).
+
+    Returns
+    -------
+    tuple of str
+        Remarks for the user: the scale, when it is not 1.
+
+    Raises
+    ------
+    OutputError
+        When the file cannot be written.
+    FlarewrightError
+        When there is no layer, two of the same name, or the scale is no power of two.
+    """
+    names = [layer.name for layer in layers]
+    if not names or len(set(names)) != len(names):
+        raise FlarewrightError(f"an EXR file needs at least one layer and no name twice, not {names}")
+    if scale is None:
+        scale = half_scale() if pixel_type == "half" else 1.0
+    if not _is_scale(scale):
+        raise FlarewrightError(f"scale {scale!r} is no power of two from 2^-63 to 2^63; give exr_scale(project)")
+    if "scale" in (metadata or {}):
+        raise FlarewrightError("metadata 'scale' would replace the file's own; choose another name")
+    parts = []
+    for k, layer in enumerate(layers):
+        # all passes cover the picture; only single ghosts have a smaller window
+        whole = k == 0 or full_windows or not layer.name.startswith("ghost.")
+        pixels, window = _over_picture(layer, size_px) if whole else (layer.pixels, layer.window)
+        header = _header(layer, window, size_px, pixel_aspect, colorspace)
+        if k == 0:
+            # a project can name files whose names are not UTF-8
+            header |= {f"{_PREFIX}{name}": printable(text) for name, text in (metadata or {}).items()}
+        parts.append(_part(layer.name, pixels, header, scale, half=pixel_type == "half", first=k == 0))
+    if printable(str(path)) != str(path):
+        raise OutputError(f"cannot write {shown(path)}: its name is not UTF-8; choose another name")
+    write_atomically(Path(path), lambda temporary: _write_parts(parts, temporary, path))
+    if scale == 1.0:
+        return ()
+    return (f"the EXR holds irradiances times {scale:.9g}, its attribute {_SCALE}; --float writes them as they are",)
+
+
+def _part(name: str, pixels: Pixels, header: dict[str, Any], scale: float, *, half: bool, first: bool) -> Any:
+    """Return the part of a layer; the header gets its scale and compression."""
+    import OpenEXR
+
+    # a variance is an irradiance squared, too small for half floats
+    by, half = (scale * scale, False) if name.endswith(".variance") else (scale, half)
+    values = _stored(pixels, by, half)
+    large = half and values.dtype == np.float32
+    header = header | {_SCALE: by} | ({"compression": OpenEXR.PXR24_COMPRESSION} if large else {})
+    # one array of three channels instead of separate planes halves the memory: "RGB" becomes R, G, B, any other name
+    # becomes NAME.R, NAME.G, NAME.B
+    return OpenEXR.Part(header, {"RGB" if first else name: values}, name)
+
+
+def _write_parts(parts: list[Any], temporary: Path, path: str | PathLike[str]) -> None:
+    """Write a temporary file for a path; raises OSError with the library's reason."""
+    import OpenEXR
+
+    # the library compresses on one thread by default; its oldest releases have no setting for it
+    if hasattr(OpenEXR, "set_global_thread_count"):
+        OpenEXR.set_global_thread_count(max(OpenEXR.global_thread_count(), os.cpu_count() or 1))
+    try:
+        OpenEXR.File(parts).write(str(temporary))
+    except RuntimeError as error:
+        # The library raises RuntimeError; with a valid header the only cause is that the file cannot be written. The
+        # message has the temporary name, then the reason.
+        message = str(error).rstrip(".")
+        reason = message.partition(f'"{temporary}". ')[2]
+        raise OSError(reason or message.replace(str(temporary), str(path))) from error
+
+
+def read_exr(path: str | PathLike[str]) -> ExrContents:
+    """Read a file that `write_exr` wrote.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    ExrContents
+
+    Raises
+    ------
+    OutputError
+        When it is not a readable EXR file.
+    """
+    try:
+        with sentences_for(path, "an EXR file"):
+            return _contents(_open_parts(path, "an EXR file"))
+    except FileError as error:
+        raise OutputError(str(error)) from error
+
+
+def _contents(file: Any) -> ExrContents:
+    """Return the layers of a file with R, G and B in each part."""
+    scales = [_scale(part) for part in file.parts]
+    layers = []
+    for k, (part, scale) in enumerate(zip(file.parts, scales, strict=True)):
+        prefix = "" if k == 0 else f"{part.name()}."
+        planes = [part.channels[f"{prefix}{name}"].pixels for name in _CHANNELS]
+        pixels = _unscaled(np.stack(planes, axis=-1).astype(np.float32, copy=False), scale)
+        x, y = (int(value) for value in part.header["dataWindow"][0])
+        about = _prefixed(part.header, f"{_PREFIX}layer.")
+        name = part.name() or "beauty"
+        layers.append(Layer(name, pixels, (x, y, pixels.shape[1], pixels.shape[0]), about))
+    header = dict(file.parts[0].header)
+    low, high = header["displayWindow"]
+    ours = {k: v for k, v in header.items() if k != _SCALE and not k.startswith(f"{_PREFIX}layer.")}
+    metadata = {k: str(v) for k, v in _prefixed(ours, _PREFIX).items()}
+    kind: Literal["half", "float"] = "half" if file.parts[0].channels["R"].pixels.dtype == np.float16 else "float"
+    size = (int(high[0] - low[0]) + 1, int(high[1] - low[1]) + 1)
+    return ExrContents(tuple(layers), size, kind, metadata, header, scales[0])
+
+
+def _open_parts(path: str | PathLike[str], what: str) -> Any:
+    """Open a file with all its parts; raises FileError also for damaged parts, which the library silently skips."""
+    import OpenEXR
+
+    with outside(path, what, pixel_bytes=8, remedy="give an EXR file"):
+        # the library's message about such a name is none
+        str(path).encode()
+        with _REDIRECT_LOCK, silenced():
+            file = OpenEXR.File(str(path), separate_channels=True)
+            whole = len(OpenEXR.File(str(path), header_only=True).parts)
+        if len(file.parts) < max(whole, 1):
+            raise ValueError("its pixels are damaged or cut short")
+    return file
+
+
+def read_exr_plane(path: str | PathLike[str], choices: Sequence[Sequence[str]], what: str = "an EXR file") -> Floats:
+    """Read one plane of any EXR file within its display window.
+
+    Parameters
+    ----------
+    path : path
+    choices : sequence of sequence of str
+        Sets of channels to average; the first set that the file has is used. The name of a single channel is ignored.
+    what : str
+        Expected kind of file, for messages.
+
+    Returns
+    -------
+    ndarray, shape (H, W)
+        0 outside the data window.
+
+    Raises
+    ------
+    FileError
+        When it is not a readable EXR file, or has none of these channels.
+    """
+    with sentences_for(path, what, "give an EXR file"):
+        part, names = _part_with(path, choices, what)
+        mean = np.mean([np.asarray(part.channels[name].pixels, float) for name in names], axis=0)
+        return _over_display(part, mean / _scale(part))
+
+
+def read_exr_colour(path: str | PathLike[str], what: str = "an EXR file") -> Pixels:
+    """Read the colours of any EXR file within its display window.
+
+    Parameters
+    ----------
+    path : path
+        With channels R, G and B, or a single channel, or Y (grey).
+    what : str
+        Expected kind of file, for messages.
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3), float32
+        0 outside the data window, and for values that are infinite or NaN.
+
+    Raises
+    ------
+    FileError
+        When it is not a readable EXR file, or has none of these channels.
+    """
+    with sentences_for(path, what, "give an EXR file"):
+        part, names = _part_with(path, (("R", "G", "B"), ("Y",)), what)
+        values = [np.asarray(part.channels[name].pixels, dtype=np.float64) / _scale(part) for name in names]
+        planes = [_over_display(part, plane) for plane in values]
+        colours = np.stack(planes if len(planes) == 3 else [planes[0]] * 3, axis=-1).astype(np.float32)
+        return np.where(np.isfinite(colours), colours, np.float32(0.0))
+
+
+def _part_with(path: str | PathLike[str], choices: Sequence[Sequence[str]], what: str) -> tuple[Any, Sequence[str]]:
+    """Return the part and the channels of the first set that a file has; a single channel can have any name."""
+    file = _open_parts(path, what)
+    known = [name for part in file.parts for name in part.channels]
+    wanted = [*choices, known] if len(known) == 1 else choices
+    found = [(part, names) for names in wanted for part in file.parts if all(name in part.channels for name in names)]
+    if not found:
+        wanted_names = " or ".join("".join(names) for names in choices)
+        raise ValueError(f"it has no channel {wanted_names}; its channels are {', '.join(known[:8]) or 'none'}")
+    return found[0]
+
+
+def _over_display(part: Any, pixels: Floats) -> Floats:
+    """Return a plane of the data window at the size of the display window, 0 outside."""
+    low, high = part.header["displayWindow"]
+    left, top = (int(a) - int(b) for a, b in zip(part.header["dataWindow"][0], low, strict=True))
+    width, height = (int(b) - int(a) + 1 for a, b in zip(low, high, strict=True))
+    plane = np.zeros((height, width))
+    inside = pixels[max(-top, 0) : max(height - top, 0), max(-left, 0) : max(width - left, 0)]
+    top, left = max(top, 0), max(left, 0)
+    plane[top : top + inside.shape[0], left : left + inside.shape[1]] = inside
+    return plane
+
+
+def exr_size(path: str | PathLike[str]) -> tuple[int, int]:
+    """Return the width and height of the first part's pixels without reading them.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    tuple of int
+
+    Raises
+    ------
+    OutputError
+        When it is not a readable EXR file.
+    """
+    import OpenEXR
+
+    try:
+        with outside(path, "an EXR file"):
+            low, high = OpenEXR.File(str(path), header_only=True).header()["dataWindow"]
+    except FileError as error:
+        raise OutputError(str(error)) from error
+    return int(high[0] - low[0]) + 1, int(high[1] - low[1]) + 1
+
+
+def _prefixed(header: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    return {name.removeprefix(prefix): value for name, value in header.items() if name.startswith(prefix)}
+
+
+def _over_picture(layer: Layer, size_px: tuple[int, int]) -> tuple[Pixels, tuple[int, int, int, int]]:
+    """Return a layer's pixels at the size of the picture, 0 outside its window."""
+    width, height = size_px
+    picture = (0, 0, width, height)
+    if layer.window == picture:
+        return layer.pixels, picture
+    x, y, w, h = layer.window
+    pixels = np.zeros((height, width, 3), np.float32)
+    left, top, right, bottom = max(x, 0), max(y, 0), min(x + w, width), min(y + h, height)
+    if left < right and top < bottom:
+        pixels[top:bottom, left:right] = layer.pixels[top - y : bottom - y, left - x : right - x]
+    return pixels, picture
+
+
+def _stored(pixels: Pixels, scale: float, half: bool) -> NDArray[Any]:
+    """Return the pixels as stored: scaled, as half floats if they are in range."""
+    if scale != 1.0:
+        pixels = pixels * np.float32(scale)
+    if not half:
+        return np.ascontiguousarray(pixels)
+    rounded = rounded_to_half(pixels)
+    return rounded if np.any(np.abs(rounded) > HALF_MAX) else rounded.astype(np.float16)
+
+
+def _unscaled(pixels: Pixels, scale: float) -> Pixels:
+    return pixels if scale == 1.0 else pixels / np.float32(scale)
+
+
+def _is_scale(scale: float) -> bool:
+    """Return whether multiplication by the scale and by its square is exact."""
+    return 2.0**-63 <= scale <= 2.0**63 and frexp(scale)[0] == 0.5
+
+
+def _scale(part: Any) -> float:
+    """Return the scale of a part's values, 1 in files of other programs; raises ValueError when it is invalid."""
+    try:
+        scale = float(part.header.get(_SCALE, 1.0))
+    except (TypeError, ValueError):
+        scale = 0.0
+    if not 0.0 < scale < inf:
+        raise ValueError(f"its attribute {_SCALE} is no number above 0")
+    return scale
+
+
+def _header(
+    layer: Layer,
+    window: tuple[int, int, int, int],
+    size_px: tuple[int, int],
+    pixel_aspect: float,
+    colorspace: Colorspace,
+) -> dict[str, Any]:
+    import OpenEXR
+
+    x, y, w, h = window
+    about = {f"{_PREFIX}layer.{name}": value for name, value in layer.about.items()}
+    return {
+        "type": OpenEXR.scanlineimage,
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "displayWindow": ((0, 0), (size_px[0] - 1, size_px[1] - 1)),
+        "dataWindow": ((x, y), (x + w - 1, y + h - 1)),
+        "pixelAspectRatio": float(pixel_aspect),
+        "chromaticities": CHROMATICITIES[colorspace],
+        "colorInteropID": _INTEROP_ID[colorspace],
+        **about,
+    }

@@ -1,0 +1,20 @@
+"""Lens files and the glass catalogue, and the text forms of coatings, plates and scatter.
+
+`toml_lens.read_lens` reads a lens file of any format; `lens_writer.write_lens` writes our own TOML format.
+
+- `coating_text`: `parse_coating`, `parse_coating_choice`, `format_coating`, `read_coating_file`
+- `dotlens`: `read_dotlens`, the `.lens` format
+- `glass_catalogue`: `by_name`, `nearest`, glasses with their dispersion formulas
+- `lens_fields`: number fields with limits, units and descriptions
+- `lens_schema`: `lens_json_schema`, the JSON Schema of our format
+- `lens_writer`: `write_lens`, `format_lens`
+- `library`: `library_names`, `lens_path`, the lenses that ship with the program
+- `media`: `attach`, `complete_medium`, dispersions for the media of a prescription
+- `plate_text`: `parse_plate`, `parse_imperfection`, `parse_grating`
+- `scatter_text`: the `[scatter]` table of a lens file
+- `shape_fields`: aspheres, tilts, figure errors, elements and positions of a lens file
+- `toml_lens`: `read_lens`, `read_lens_toml`, `lens_from_table`
+- `zemax`: `read_zmx`, the `.zmx` format and its glass names
+- `zemax_keywords`: keywords that `zemax` uses, and those without effect
+- `zemax_text`: lines of a `.zmx` file grouped by surface, encodings, decimal commas
+"""

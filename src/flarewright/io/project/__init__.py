@@ -1,0 +1,8 @@
+"""Project, scene and look files, and the text forms of spectra.
+
+- `look_file`: `read_look`, `look_text`, `shipped_looks`
+- `project_file`: `read_project`, `project_from_data`, `project_json_schema`
+- `project_text`: `project_text`, projects as TOML
+- `scene_file`: `read_scene`, `scene_from_data`, `scene_json_schema`
+- `spectrum_text`: `parse_spectrum`, `spectrum_text`, `read_spectrum_csv`
+"""

@@ -1,0 +1,183 @@
+"""Scene files: TOML that holds cameras and lights in space, for `flarewright predict` (docs/predict.md).
+
+Relative paths (lens, measured model, coating, spectrum table) start at the scene file's folder. A camera's `coating`
+and a light's `spectrum` can be short texts, as in a project file.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from ...errors import FlarewrightError, ProjectError
+from ...model.project import light as spectra
+from ...model.project import project as choices
+from ...model.project import scene as records
+from ...model.project.scene import Scene
+from ..files.file_kind import refuse_lens_suffix, refuse_other_kind
+from ..files.sentences import shorten, summary
+from ..files.text_file import check_version, read_toml
+from ..files.type_slips import record_of
+from .project_file import (
+    ProjectFileError,
+    Sections,
+    accept_text,
+    expand_coating,
+    expand_light,
+    lens_location,
+    validation_messages,
+)
+from .project_text import ABOUT
+
+_NEWEST = 1
+
+_SECTIONS: Sections = {
+    "": (Scene,),
+    "site": (records.Site,),
+    "time": (records.Span,),
+    "cameras": (records.SceneCamera,),
+    "lights": (records.Lamp, records.Distant, records.Sun),
+    "keyframes": (records.CameraKey, records.LampKey),
+    "coating": (choices.Preset, choices.Everywhere, choices.InTurn, choices.PerRow),
+    "spectrum": (spectra.BlackBody, spectra.Lines, spectra.Tabulated, spectra.Rgb),
+}
+
+EXAMPLE = """\
+# A scene for light planning; metres, x right and y up in the plan, z to the sky. docs/predict.md
+schema_version = 1
+name = "Evening match"
+luminance_cd_m2 = [1.0, 200.0]   # darkest and brightest that the cameras see; default: no contrast is reported
+north_deg = 0.0   # compass direction of y
+
+[site]   # for the sun
+latitude_deg = 48.21
+longitude_deg = 16.37
+
+[time]
+start = 2024-06-21T18:00:00+02:00
+duration_s = 9000.0
+step_s = 600.0
+
+[[cameras]]
+name = "east stand"
+lens = "flektogon-35"   # or a lens file; or model = "compact.json", a measured flare, with unit_per_cd_m2
+position_m = [60.0, 0.0, 15.0]
+aim_m = [0.0, 0.0, 0.0]
+f_number = 4.0
+coating = "quarter-wave:550"
+iso = 400.0
+exposure_s = 0.002
+
+[[cameras]]
+name = "south goal"
+lens = "nikkor-85-f1.4"
+position_m = [5.0, -70.0, 4.0]
+aim_m = [0.0, -20.0, 1.0]
+f_number = 2.8
+coating = "quarter-wave:550"
+[[cameras.keyframes]]   # pans to the centre within ten minutes
+at_s = 600.0
+aim_m = [0.0, 0.0, 1.0]
+
+[[lights]]
+kind = "sun"
+
+[[lights]]
+kind = "lamp"
+name = "north mast"
+position_m = [-40.0, 60.0, 40.0]
+intensity_cd = 2e6   # or luminance_cd_m2 with diameter_m
+diameter_m = 0.6
+aim_m = [0.0, 0.0, 0.0]
+beam_deg = 40.0   # half of the intensity at 20 degrees from the aim
+spectrum = "black-body:5000"
+"""
+"""The file that `flarewright scene init` writes."""
+
+
+def read_scene(path: str | os.PathLike[str]) -> Scene:
+    """Read and check a scene file.
+
+    Parameters
+    ----------
+    path : path
+        A TOML file.
+
+    Returns
+    -------
+    Scene
+        Short texts are parsed; relative paths are resolved from the file's folder.
+
+    Raises
+    ------
+    ProjectError
+        When the file cannot be read or has errors; `problems` then lists all of them, each with its place.
+    """
+    path = Path(path)
+    try:
+        refuse_lens_suffix(path, "scene")
+        data = read_toml(path, "a scene file")
+        refuse_other_kind(path, data, "scene")
+    except ValueError as error:
+        raise ProjectError(str(error)) from None
+    return scene_from_data(data, folder=path.parent, where=str(path))
+
+
+def scene_from_data(data: dict[str, Any], *, folder: Path, where: str) -> Scene:
+    """Return the scene of parsed TOML; parameters and errors as `project_file.project_from_data`."""
+    try:
+        check_version(data, _NEWEST, f"the scene file {where}")
+    except ValueError as error:
+        raise ProjectError(str(error)) from None
+    problems: list[str] = []
+    out = dict(data)
+    if isinstance(out.get("cameras"), list):
+        out["cameras"] = [_camera(one, f"cameras[{k}]", folder, problems) for k, one in enumerate(out["cameras"])]
+    if isinstance(out.get("lights"), list):
+        out["lights"] = [_light(one, f"lights[{k}]", folder, problems) for k, one in enumerate(out["lights"])]
+    scene, wrong = record_of(Scene.model_validate, out, lambda error: validation_messages(error, out, _SECTIONS))
+    problems += wrong
+    if scene is None or problems:
+        raise ProjectFileError(summary(where, problems), tuple(problems))
+    return scene
+
+
+def _camera(table: Any, where: str, folder: Path, problems: list[str]) -> Any:
+    if not isinstance(table, dict):
+        return table
+    out = dict(table)
+    if isinstance(out.get("lens"), str):
+        out["lens"] = lens_location(out["lens"], folder)
+    if isinstance(out.get("model"), str):
+        out["model"] = str(folder / out["model"])
+    if "coating" in out:
+        try:
+            out["coating"] = expand_coating(out["coating"], folder)
+        except FlarewrightError as error:
+            problems.append(f"{where}.coating: {error}")
+            del out["coating"]
+    return out
+
+
+def _light(table: Any, where: str, folder: Path, problems: list[str]) -> Any:
+    """Parse a light's spectrum; the default kind is a lamp."""
+    if not isinstance(table, dict):
+        return table
+    kind = table.get("kind", "lamp")
+    if kind not in ("lamp", "distant", "sun"):
+        # without a known kind no other key can be checked: report only the kind, and return a valid lamp
+        problems.append(f"{where}.kind should be lamp, distant or sun, not {shorten(kind)}")
+        return {"kind": "lamp", "name": f"?{where}", "position_m": (0.0, 0.0, 0.0), "intensity_cd": 1.0}
+    return expand_light({**table, "kind": kind}, where, folder, problems)
+
+
+def scene_json_schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of a scene file, for validation in text editors."""
+    schema = Scene.model_json_schema()
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    schema["title"] = "Flarewright scene"
+    accept_text(schema["$defs"]["SceneCamera"]["properties"]["coating"], ABOUT["coating"])
+    for kind in ("Lamp", "Distant", "Sun"):
+        accept_text(schema["$defs"][kind]["properties"]["spectrum"], ABOUT["lights.spectrum"])
+    return schema

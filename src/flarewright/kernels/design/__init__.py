@@ -1,0 +1,11 @@
+"""Lens design: paraxial ghosts with exact derivatives, cost of a prescription, local searches.
+
+- `ghosts`: place, size and scale of all ghosts: `ghosts_of_many`, `ghosts_with_derivatives`
+- `cost`: misfit to targets, cost of extra ghosts: `irradiance_of_ghosts`, for kernels `total_cost`
+- `assignment`: `match`, ghosts to targets at least cost
+- `vignetting`: visibility of ghosts and its derivatives
+- `edge_thickness`: gaps at the edge of the axial beam: `beam_of`
+- `local_search`: `polish_many`, Levenberg-Marquardt on ghost targets; `limit_excess`
+- `picture_search`: `polish_by_picture`, damped Gauss-Newton on pictures; `draw_picture`
+- `fitness`: `fitness_of_genes`, `decode_many`, `sorted_misfit`, for general-purpose solvers
+"""

@@ -1,0 +1,278 @@
+"""Representative rays of a bundle: their visibility, selection, angles of incidence, shift between two wavelengths."""
+
+from math import sqrt
+
+import numpy as np
+
+from ..jit.decorators import borrowing, compiled
+from .clip import blade_value
+from .refract import ray_from_near
+from .sequential import ALIVE, REFLECT, REL, STOP_X, X, Y, hit_rays
+
+
+@borrowing
+def crosses(rays, k, iris_radius):
+    """Return whether a ray crosses the stop inside a circle, at every crossing."""
+    for column in range(STOP_X, rays.shape[1], 2):
+        u, v = rays[k, column], rays[k, column + 1]
+        if not u * u + v * v <= iris_radius * iris_radius:
+            return False
+    return True
+
+
+@borrowing
+def passes(rays, k, iris_radius):
+    """Return whether a ray passes all rims and crosses the stop inside a circle, at every crossing."""
+    return rays[k, ALIVE] > 0.0 and rays[k, REL] <= 1.0 and crosses(rays, k, iris_radius)
+
+
+@borrowing
+def lands_at(place, x, y):
+    """Return column and row of a place on the sensor; `place` as in `seen_rays`."""
+    return place[0, 0] + place[0, 1] * x + place[0, 2] * y, place[1, 0] + place[1, 1] * x + place[1, 2] * y
+
+
+@borrowing
+def within_blades(rays, k, blades, axes):
+    """Return whether a ray crosses the stop within the blades, at every crossing; `axes` as in `clip.clip_triangle`."""
+    for column in range(STOP_X, rays.shape[1], 2):
+        x, y = rays[k, column], rays[k, column + 1]
+        u, v = x * axes[0, 0] + y * axes[1, 0], x * axes[0, 1] + y * axes[1, 1]
+        for b in range(blades.shape[0]):
+            if blade_value(blades, b, u, v) > 0.0:
+                return False
+    return True
+
+
+@compiled
+def seen_rays(rays, iris_radius, blades, axes, place, width, height):
+    """Return which rays pass all rims, cross the stop within the iris, and land in the picture.
+
+    Parameters
+    ----------
+    rays : ndarray, shape (N, 5 + 2 C)
+        As `kernels.tracing.sequential.trace_lanes` fills them.
+    iris_radius : float
+        Radius of the circumscribed circle of the iris, mm.
+    blades : ndarray, shape (B, 4)
+        Edges of the iris in the upright frame (`optics.pupil.iris.blade_edges`).
+    axes : ndarray, shape (2, 2)
+        Upright x, y of the meridional x axis and of the meridional y axis.
+    place : ndarray, shape (2, 3)
+        For column and row: the value at x = y = 0 on the sensor, and the derivatives by x and by y, pixels per mm.
+    width, height : float
+        Size of the picture; infinite to check only rims and iris.
+
+    Returns
+    -------
+    ndarray, shape (N,), bool
+    """
+    seen = np.empty(rays.shape[0], dtype=np.bool_)
+    everywhere = width == np.inf
+    for k in range(rays.shape[0]):
+        seen[k] = False
+        if not (passes(rays, k, iris_radius) and within_blades(rays, k, blades, axes)):
+            continue
+        x, y = rays[k, X], rays[k, Y]
+        column, row = lands_at(place, x, y)
+        seen[k] = everywhere or (0.0 <= column < width and 0.0 <= row < height)
+    return seen
+
+
+@compiled
+def choose_representatives(pupil, triangles, passing, step, count):
+    """Choose nodes of a bundle, spread evenly over the area of the pupil that passes.
+
+    Parameters
+    ----------
+    pupil : ndarray, shape (N, 2)
+    triangles : ndarray, shape (T, 3), int64
+    passing : ndarray, shape (N,), bool
+    step : int
+        Use every step-th triangle.
+    count : int
+        Number of nodes to choose.
+
+    Returns
+    -------
+    ndarray, int64
+        `count` nodes; empty if no node passes.
+    """
+    reached = np.empty(3 * ((triangles.shape[0] + step - 1) // step))
+    total = 0.0
+    corner = 0
+    for t in range(0, triangles.shape[0], step):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        x1, y1 = pupil[b, 0] - pupil[a, 0], pupil[b, 1] - pupil[a, 1]
+        x2, y2 = pupil[c, 0] - pupil[a, 0], pupil[c, 1] - pupil[a, 1]
+        area = abs(x1 * y2 - y1 * x2)
+        for m in range(3):
+            if passing[triangles[t, m]]:
+                total += area
+            reached[corner] = total
+            corner += 1
+    chosen = np.empty(count if total > 0.0 else 0, dtype=np.int64)
+    corner = 0
+    for k in range(chosen.size):
+        share = (k + 0.5) / count * total
+        while corner + 1 < reached.size and reached[corner] < share:
+            corner += 1
+        chosen[k] = triangles[corner // 3 * step, corner % 3]
+    return chosen
+
+
+@compiled
+def passing_area(pupil, triangles, passing):
+    """Return the pupil area represented by the passing nodes of a bundle.
+
+    Parameters
+    ----------
+    pupil, triangles, passing
+        As in `choose_representatives`.
+
+    Returns
+    -------
+    float
+        mm^2; each node represents a third of the area of its triangles.
+    """
+    total = 0.0
+    for t in range(triangles.shape[0]):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        count = int(passing[a]) + int(passing[b]) + int(passing[c])
+        if count > 0:
+            x1, y1 = pupil[b, 0] - pupil[a, 0], pupil[b, 1] - pupil[a, 1]
+            x2, y2 = pupil[c, 0] - pupil[a, 0], pupil[c, 1] - pupil[a, 1]
+            total += count * abs(x1 * y2 - y1 * x2)
+    return total / 6.0
+
+
+@compiled
+def traced_squares(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, squares):
+    """Compute the angles of incidence of rays at the surfaces of a path.
+
+    Parameters
+    ----------
+    rows ... py
+        As in `kernels.tracing.sequential.hit_rays`.
+    squares : ndarray, shape (N, S)
+        Filled, from the first row, with the squared sine on the lower-index side at every step: 1 under total
+        reflection, 0 at the stop and where the index does not change.
+
+    Returns
+    -------
+    int
+        Number of rows filled; rays that end early have none.
+
+    Notes
+    -----
+    For a reflection |d' - d| = 2 cos. A refraction changes n d only along the normal (Snell's law in vector form), so
+    n d - n' d' is parallel to the normal.
+    """
+    steps = rows.shape[0]
+    hits = np.empty((px.shape[0], steps + 2, 3))
+    hit_rays(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits)
+    before, behind = np.empty(3), np.empty(3)
+    count = 0
+    for k in range(px.shape[0]):
+        if not np.isfinite(hits[k, steps + 1, 0] + hits[k, steps + 1, 1]):
+            continue
+        forward = True
+        for step in range(steps):
+            row = rows[step]
+            n_in, n_out = (n_gap[row], n_gap[row + 1]) if forward else (n_gap[row + 1], n_gap[row])
+            reflects = actions[step] == REFLECT
+            squares[count, step] = 0.0
+            if reflects:
+                forward = not forward
+            elif n_in == n_out:
+                continue
+            one, other = 0.0, 0.0
+            for axis in range(3):
+                at = hits[k, step + 1, axis]
+                before[axis], behind[axis] = at - hits[k, step, axis], hits[k, step + 2, axis] - at
+                one += before[axis] ** 2
+                other += behind[axis] ** 2
+            if step == 0:
+                # the plane of the first vertex may lie behind a concave front, or touch it
+                before[0], before[1], before[2], _ = ray_from_near(tilt, nearness, px[k], py[k])
+                one = before[0] ** 2 + before[1] ** 2 + before[2] ** 2
+            if one == 0.0 or other == 0.0:
+                continue
+            one, other = 1.0 / sqrt(one), 1.0 / sqrt(other)
+            if reflects:
+                turned = 0.0
+                for axis in range(3):
+                    turned += (behind[axis] * other - before[axis] * one) ** 2
+                ratio = max(n_in / n_out, 1.0)
+                square = (1.0 - 0.25 * turned) * ratio * ratio
+            else:
+                normal, along = 0.0, 0.0
+                for axis in range(3):
+                    incoming, outgoing = before[axis] * one, behind[axis] * other
+                    across = n_in * incoming - n_out * outgoing
+                    normal += across * across
+                    along += across * (incoming if n_in < n_out else outgoing)
+                square = 1.0 - along * along / normal if normal > 0.0 else 0.0
+            squares[count, step] = min(max(square, 0.0), 1.0)
+        count += 1
+    return count
+
+
+@compiled
+def shift_quantile(short, long, iris_radius, view_radius, quantile):
+    """Return a quantile of the shifts of a bundle's rays on the sensor between two wavelengths.
+
+    Parameters
+    ----------
+    short, long : ndarray, shape (N, 5 + 2 C)
+        The same rays at both wavelengths (`kernels.tracing.sequential.trace_lanes`).
+    iris_radius : float
+        Ignore rays that cross the stop farther out at the first wavelength, mm.
+    view_radius : float
+        Ignore rays that land farther from the axis at the first wavelength, mm.
+    quantile : float
+        Quantile over the rays that reach the sensor at both wavelengths and pass all rims at one of them at least.
+
+    Returns
+    -------
+    float
+        Shift, mm; 0 if no ray passes.
+    """
+    shifts = np.empty(short.shape[0])
+    count = 0
+    for k in range(short.shape[0]):
+        if short[k, ALIVE] * long[k, ALIVE] == 0.0 or min(short[k, REL], long[k, REL]) > 1.0:
+            continue
+        if not crosses(short, k, iris_radius):
+            continue
+        x, y = short[k, X], short[k, Y]
+        if x * x + y * y <= view_radius * view_radius:
+            across, along = long[k, X] - x, long[k, Y] - y
+            shifts[count] = across * across + along * along
+            count += 1
+    return sqrt(_ranked(shifts, count, int(quantile * (count - 1)))) if count > 0 else 0.0
+
+
+@borrowing
+def _ranked(values, count, rank):
+    """Return the value of a rank among the first `count` values by quickselect (Hoare 1961); reorders the values."""
+    low, high = 0, count - 1
+    while low < high:
+        pivot = values[(low + high) // 2]
+        i, j = low, high
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while values[j] > pivot:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i += 1
+                j -= 1
+        if rank <= j:
+            high = j
+        elif rank >= i:
+            low = i
+        else:
+            break
+    return values[rank]

@@ -1,0 +1,37 @@
+"""Read the frames of a merged run as views."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+
+from ...errors import FlarewrightError
+from ...io.measurement.merged import read_frame
+from ...model.measurement.capture import FrameInfo, MergedRun
+from .parallel import map_batched
+from .views import View, views_of
+
+
+def read_views(
+    folder: Path, run: MergedRun, every: int = 1, pool: ThreadPoolExecutor | None = None
+) -> tuple[View, ...]:
+    """Read every n-th frame of each roll of a run, in order of rising constellation; other files are not opened.
+
+    Raises
+    ------
+    FlarewrightError
+        When a frame cannot be read, or fewer than three remain.
+    """
+    largest = max((abs(each.constellation_deg) for each in run.frames), default=0.0)
+    rolls: dict[float, list[FrameInfo]] = {}
+    for each in sorted(run.frames, key=lambda one: (one.nominal_deg, one.constellation_deg)):
+        rolls.setdefault(each.nominal_roll_deg, []).append(each)
+    frames = [each for turned in rolls.values() for each in turned[::every]]
+    if len(frames) < 3 <= len(run.frames):
+        raise FlarewrightError(
+            f"{folder}: --every {every} leaves {len(frames)} of {len(run.frames)} constellations, too few to follow a "
+            f"ghost; use at most --every {max(1, (len(run.frames) - 1) // 2)}"
+        )
+    frames.sort(key=lambda each: (each.constellation_deg, each.roll_deg))
+    return views_of(map_batched(partial(read_frame, folder), frames, pool=pool), largest)

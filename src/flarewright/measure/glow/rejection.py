@@ -1,0 +1,81 @@
+"""Reject detected ghosts that are residual glow around the light.
+
+Halo and star are known to a few percent. Their residual surrounds the light and moves with it. Over many
+constellations it looks like a ghost, and a fit describes it as one. A photograph cannot distinguish a faint disc that
+never leaves the light from the halo, or light below 0.5 % of the glow from an error of the glow's law.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...kernels.ghost_model.pupil_centre import fill_middles
+from ...typing import Floats, Mask
+from ..core.parameters import Shape
+from ..core.sampling import evenly_spaced
+from ..core.views import View
+from ..fitting.detected_ghost import CHANNELS, DetectedGhost, leading, noise_of
+from ..fitting.ghost_fit import light_of
+from .settings import RejectionSettings
+from .subtraction import AROUND_LIGHT, masks_of
+
+
+def is_residual_glow(
+    ghosts: Sequence[DetectedGhost], views: Sequence[View], settings: RejectionSettings = RejectionSettings()
+) -> list[bool]:
+    """Return for each detected ghost whether it is residual glow.
+
+    Parameters
+    ----------
+    ghosts : sequence of DetectedGhost
+    views : sequence of View
+        As photographed, in the same pixels.
+    settings : RejectionSettings
+
+    Returns
+    -------
+    list of bool
+        True for ghosts centred on the light in all their views that are faint or hardly larger than the masked disc
+        around the light. Also true for ghosts that are a negligible fraction of the light at their position.
+    """
+    noise, masks = noise_of(views), masks_of(views)
+    return [_is_glow(ghost, leading(ghost, noise), views, masks, settings) for ghost in ghosts]
+
+
+def _is_glow(
+    ghost: DetectedGhost, lead: int, views: Sequence[View], masks: Sequence[Mask], settings: RejectionSettings
+) -> bool:
+    seen = views[ghost.first : ghost.last + 1]
+    place, size = _centre_and_size(ghost.shapes[lead], np.array([view.sigma for view in seen]))
+    light = np.array([view.off_axis_px for view in seen])
+    off = np.abs(place - light)
+    # largest offset, over the size or over the light's distance from the axis
+    far = max((off / np.maximum(size, 1e-9)).max(), off.max() / max(light.max(), 1e-9))
+    hidden = settings.hidden_size * AROUND_LIGHT * views[0].size_px[0] + settings.coarse_px
+    if far <= settings.hidden_offset and size.max() <= hidden:
+        return True
+    part = _brightness_fraction(ghost, views, masks, settings)
+    return any(far <= least and part <= most for least, most in settings.limits)
+
+
+def _centre_and_size(shape: Shape, sigma: Floats) -> tuple[Floats, Floats]:
+    """Return position along the line through axis and light, and size, of the pupil centre's image, pixels."""
+    middles = np.zeros((3, sigma.size))
+    fill_middles(np.tile(shape.numbers, (sigma.size, 1)), sigma, middles)
+    return middles[0], np.abs(middles[1])
+
+
+def _brightness_fraction(
+    ghost: DetectedGhost, views: Sequence[View], masks: Sequence[Mask], settings: RejectionSettings
+) -> float:
+    """Return the light of a ghost over all light at its position, within the masks; 0 when there is none."""
+    own, every = 0.0, 0.0
+    for k in evenly_spaced(range(ghost.first, ghost.last + 1), settings.views):
+        for m in range(CHANNELS):
+            part, light = light_of(ghost.shapes[m], views[k])
+            there = masks[k][part] & (light > 0.0)
+            own += float(light[there].sum())
+            every += float(views[k].pixels[part][..., m][there].sum())
+    return own / every if every > 0.0 else 0.0

@@ -1,0 +1,99 @@
+"""Rotate merged frames upright: remove tilt and jitter of the horizon from the pixels."""
+
+from __future__ import annotations
+
+from math import cos, radians, sin
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import OutputError
+from ...io.measurement.merged import read_frame, write_frame
+from ...model.measurement.capture import FrameInfo, MergedFrame, MergedRun
+from ...typing import Floats, Pixels, Progress
+
+UPRIGHT = "upright"
+
+
+def make_upright(folder: Path, run: MergedRun, tell: Progress) -> MergedRun:
+    """Write all frames of a run rotated about the axis, so that the light's direction is exactly the captures' roll.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the run.
+    run : MergedRun
+        With frames as photographed.
+    tell : callable
+        Called with the finished part (0 to 1) and a description.
+
+    Returns
+    -------
+    MergedRun
+        With the new files; the old ones are kept.
+
+    Raises
+    ------
+    OutputError
+        When a frame cannot be written.
+
+    Notes
+    -----
+    Interpolation is bilinear, which lowers a pixel's variance and correlates neighbours. Search and fit do not need
+    such frames: they use the tilt of each frame.
+    """
+    try:
+        (folder / UPRIGHT).mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot make the folder {folder / UPRIGHT}: {(error.strerror or '').lower()}") from None
+    infos = []
+    for k, info in enumerate(run.frames):
+        frame = turned_upright(read_frame(folder, info))
+        here: FrameInfo = frame.info.replace(file=f"{UPRIGHT}/{Path(info.file).name}")
+        write_frame(folder, MergedFrame(here, frame.radiance, frame.variance))
+        infos.append(here)
+        tell((k + 1) / len(run.frames), f"upright {k + 1} of {len(run.frames)}")
+    reported = "frames were turned upright (--upright): neighbouring pixels share some of their noise"
+    out: MergedRun = run.replace(frames=tuple(infos), remarks=(*run.remarks, reported))
+    return out
+
+
+def turned_upright(frame: MergedFrame) -> MergedFrame:
+    """Rotate a frame about its axis by the tilt of its horizon.
+
+    Parameters
+    ----------
+    frame : MergedFrame
+
+    Returns
+    -------
+    MergedFrame
+        Its roll is the nominal one; pixels from beyond the border have infinite variance.
+    """
+    info = frame.info
+    tilt = radians(info.horizon_deg)
+    c, s = cos(tilt), sin(tilt)
+    height, width = frame.radiance.shape[:2]
+    x, y = np.arange(width) + 0.5 - info.axis_px[0], np.arange(height)[:, None] + 0.5 - info.axis_px[1]
+    # rows count downwards: the tilt is counterclockwise in the upright picture
+    u, v = info.axis_px[0] + c * x + s * y - 0.5, info.axis_px[1] - s * x + c * y - 0.5
+    inside = (u >= 0.0) & (u <= width - 1) & (v >= 0.0) & (v <= height - 1)
+    left = np.clip(np.floor(u), 0, width - 2).astype(np.intp)
+    top = np.clip(np.floor(v), 0, height - 2).astype(np.intp)
+    a, b = (np.clip(u - left, 0.0, 1.0))[..., None], (np.clip(v - top, 0.0, 1.0))[..., None]
+    light, noise = np.zeros((height, width, 3)), np.zeros((height, width, 3))
+    for down, right, weight in ((0, 0, (1 - a) * (1 - b)), (0, 1, a * (1 - b)), (1, 0, (1 - a) * b), (1, 1, a * b)):
+        light += weight * frame.radiance[top + down, left + right]
+        noise += _times(weight**2, frame.variance[top + down, left + right])
+    noise[~inside] = np.inf
+    light[~inside] = 0.0
+    dx, dy = info.light_px[0] - info.axis_px[0], info.light_px[1] - info.axis_px[1]
+    place = info.axis_px[0] + c * dx - s * dy, info.axis_px[1] + s * dx + c * dy
+    here: FrameInfo = info.replace(roll_deg=info.nominal_roll_deg, light_px=place)
+    return MergedFrame(here, light.astype(np.float32), noise.astype(np.float32))
+
+
+def _times(weight: Floats, variance: Pixels) -> Floats:
+    """Return weight times variance; 0 where the weight is 0, also for an infinite variance."""
+    with np.errstate(invalid="ignore"):
+        return np.where(weight > 0.0, weight * variance, 0.0)

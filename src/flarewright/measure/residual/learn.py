@@ -1,0 +1,110 @@
+"""Learn the residual of views beside a model's ghosts, star and halo, as sprites."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from ...model.measurement.ghost_model import GhostModel
+from ...typing import Pixels
+from ..core.checkpoint import Journal
+from ..core.parallel import map_batched
+from ..core.views import View
+from ..glow.subtraction import AROUND_LIGHT, light_around, masks_of, off_light
+from ..replay.blob_drawing import draw_blobs
+from ..replay.ghost_arrays import pack
+from ..replay.light_law import light_of_view
+from ..replay.model_image import draw
+from .blob_sprites import all_hidden, blob_sprites, blobs_of, covered_cells
+from .clamp_range import with_reaches
+from .fine_detail_fit import with_detail
+from .motion_fit import with_moves
+from .sprite_fit import axis_sprite, beside_sprites, light_sprites
+from .star_spikes import spike_sprites
+
+# within this distance of the light, part of a picture's width, only sprites that follow the light are learned
+NEXT_TO_LIGHT = 24.0 / 720.0
+
+
+def with_residual(
+    model: GhostModel, views: Sequence[View], threads: int | None = None, journal: Journal | None = None
+) -> GhostModel:
+    """Return a model whose sprites hold the residual of views beside ghosts, star and halo; old sprites are dropped.
+
+    Parameters
+    ----------
+    model : GhostModel
+    views : sequence of View
+        As photographed.
+    threads : int, optional
+    journal : Journal, optional
+        Journal of an interrupted run to resume; it does not change the result.
+    """
+    steps = journal or Journal()
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        placed = [replace(view, light_px=light_of_view(model, view)) for view in views]
+        left = map_batched(partial(_left_by, model), placed, pool=pool)
+        blobs = blobs_of(model, placed)
+        # mask blobs: they are so bright that coarse cells would spread their errors over the surroundings
+        masks = covered_cells(blobs, placed, left)
+        spikes = steps.step(lambda: spike_sprites(placed, all_hidden(left, masks, pool), model.star))
+        left = beside_sprites(left, spikes, placed, pool)
+        # coarse images overshoot beside the light's image; finer ones correct that only where values are known
+        around = map_batched(around_light, placed, all_hidden(left, masks, pool), pool=pool)
+        going = steps.step(lambda: light_sprites(placed, around, model.star is not None, pool))
+        left = beside_sprites(left, going, placed, pool)
+        # next to the light a pixel's error exceeds everything that turns about the axis
+        next_to_light = [off_light(view) < NEXT_TO_LIGHT * view.size_px[0] for view in placed]
+        axis = steps.step(
+            lambda: axis_sprite(placed, all_hidden(all_hidden(left, masks, pool), next_to_light, pool), pool)
+        )
+        left = beside_sprites(left, (axis,), placed, pool)
+        small = steps.step(lambda: blob_sprites(blobs, placed, left, masks_of(placed)))
+    still = model.replace(sprites=(*spikes, *going, axis, *small))
+    moving = still.replace(sprites=steps.step(lambda: with_moves(still, threads).sprites))
+    packed = pack(moving)
+    left = [
+        each - draw_blobs(small, packed, moving, view.constellation_deg, view.frame, view.size_px)
+        for each, view in zip(left, placed, strict=True)
+    ]
+    return with_reaches(with_detail(moving, placed, all_hidden(left, next_to_light), threads), placed, threads)
+
+
+def _left_by(model: GhostModel, view: View) -> Pixels:
+    """Return the residual of a view beside a model's ghosts, halo and star; NaN where it was not measured."""
+    ghosts = draw(model, view.constellation_deg, view.roll_deg, view.size_px)
+    return np.asarray(view.measured - ghosts - light_around(model.halo, model.star, view), dtype=np.float32)
+
+
+def around_light(view: View, pixels: Pixels) -> Pixels:
+    """Fill unknown pixels near the light with the median of the known pixels at the same distance.
+
+    Parameters
+    ----------
+    view : View
+    pixels : ndarray, shape (H, W, 3)
+        NaN where nothing was measured.
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3)
+        Unchanged far from the light, at distances without known pixels, and where the view was not measured, such as
+        the clipped middle of the light.
+    """
+    rings = off_light(view).astype(np.int64)
+    near = rings < AROUND_LIGHT * view.size_px[0]
+    ring, light = rings[near], pixels[near]
+    known = np.isfinite(light).all(axis=1)
+    gaps = np.isnan(light).any(axis=1) & np.isfinite(view.variance[near]).all(axis=1)
+    for far in np.unique(ring[gaps]):
+        reported = light[known & (ring == far)]
+        if reported.size:
+            light[gaps & (ring == far)] = np.median(reported, axis=0)
+    out = pixels.copy()
+    out[near] = light
+    return out

@@ -1,0 +1,15 @@
+"""Records of projects and scenes: what is rendered, designed or predicted.
+
+`flarewright.model` re-exports most public records.
+
+- `art`: `Art` and its `Rule`, art direction
+- `camera`: `Camera`, sensor and picture size
+- `design`: `Design`, `Bounds`, `GhostTarget`, settings of the lens design
+- `holdout`: `Holdout`, objects that hide lights
+- `light`: `Light`, its shapes and spectra
+- `look`: `Look`, reusable settings of a flare
+- `project`: `Project`, `Quality`, `Output`, coating choices
+- `reference_state`: `ReferenceState`, an interrupted reference render
+- `scene`: `Scene` with its cameras and lights, for light planning
+- `starburst`: `Starburst` and `Dirt`
+"""

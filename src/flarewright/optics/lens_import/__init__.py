@@ -1,0 +1,6 @@
+"""Make complete lenses of imported prescriptions.
+
+- `patent_repair`: `repair`, validates and repairs a `.lens` table
+- `semi_diameters`: `with_semi_diameters`, estimates missing semi-diameters
+- `sequential_import`: `lens_of_sequence`, converts a sequential ray-trace file
+"""

@@ -1,0 +1,168 @@
+"""Make a lens of a sequential ray-trace file, or raise an error with the reason.
+
+Such files are more reliable than tables typed from patents, so repairs are few: idle planes are dropped, the stop
+becomes a separate row, and the f-number follows from the aperture specification.
+"""
+
+from __future__ import annotations
+
+from math import atan, degrees
+
+from ...errors import LensError
+from ...model import Lens, Row, Stop, Surface
+from ...model.lens.prescription import NO_GLASS
+from ...model.lens.raw_lens import LensReading, RawSequence, SequenceRow
+from ..lens.paraxial import FirstOrder, first_order
+
+# threshold for a remark: distance of the stated image from the focus, part of the focal length
+IMAGE_OFF = 0.02
+# f-number of the draft lens before the real one is known
+TRIAL = 8.0
+
+
+def lens_of_sequence(raw: RawSequence) -> LensReading:
+    """Make a lens of a sequential file's contents.
+
+    Parameters
+    ----------
+    raw : RawSequence
+
+    Returns
+    -------
+    LensReading
+        The lens and a remark for every change, assumption and omission.
+
+    Raises
+    ------
+    LensError
+        When it is no complete camera lens.
+    """
+    remarks: list[str] = []
+    kept, front = _without_idle(raw, remarks)
+    rows = _with_stop(raw, kept, remarks)
+    draft = Lens(name=raw.name, source=f"from {raw.file}", f_number=TRIAL, rows=tuple(rows))
+    order = _order(raw, draft)
+    f_number = _f_number(raw, order, remarks)
+    if not 0.3 < f_number <= 256.0:
+        raise LensError(f"{raw.file}: its f-number would be f/{f_number:.3g}, out of range for a lens: set FNUM")
+    _remark_image(kept[-1], order, remarks)
+    rows = _within_spheres(rows, remarks)
+    _remark_rims(kept, remarks)
+    distance = None if raw.focus_distance is None else raw.focus_distance + front
+    if distance is not None:
+        remarks.append(f"the object lies {distance:g} mm in front of the lens; it is focused there")
+    lens = draft.replace(rows=tuple(rows), f_number=f_number, field_deg=_field_deg(raw, order), focus_distance=distance)
+    remarks += raw.remarks
+    notes = [f"Imported from {raw.file}.", raw.notes, *remarks]
+    return LensReading(lens.replace(notes="\n".join(note for note in notes if note)), tuple(remarks))
+
+
+def _without_idle(raw: RawSequence, remarks: list[str]) -> tuple[list[SequenceRow], float]:
+    """Drop surfaces with the same medium on both sides; also return the distance from the first of them to the lens."""
+    kept: list[SequenceRow] = []
+    idle: list[str] = []
+    front = 0.0
+    before = None
+    for row in raw.rows:
+        behind = row.surface.medium
+        if row.stop or behind != before:
+            kept.append(row)
+        else:
+            idle.append(str(row.number))
+            if kept:
+                last = kept[-1].surface
+                kept[-1] = kept[-1].replace(surface=last.replace(thickness=last.thickness + row.surface.thickness))
+            else:
+                front += row.surface.thickness
+        before = behind
+    if idle:
+        which = f"surface{'s'[: len(idle) > 1]} {', '.join(idle)}"
+        remarks.append(f"{which}: the same medium on both sides, so no refraction or reflection; dropped")
+    return kept, front
+
+
+def _with_stop(raw: RawSequence, kept: list[SequenceRow], remarks: list[str]) -> list[Row]:
+    """Insert the stop as a separate row, because here it cannot refract."""
+    if not any(row.surface.medium is not None for row in kept):
+        raise LensError(f"{raw.file}: {NO_GLASS}")
+    if kept[-1].surface.medium is not None:
+        raise LensError(f"{raw.file}: surface {kept[-1].number}: the image lies inside glass, so it is no camera lens")
+    if sum(row.stop for row in kept) != 1:
+        raise LensError(f"{raw.file}: {sum(row.stop for row in kept)} surfaces are the stop; a lens has exactly one")
+    rows: list[Row] = []
+    before = None
+    for row in kept:
+        surface, behind = row.surface, row.surface.medium
+        if not row.stop:
+            rows.append(surface)
+        elif before is None and behind is None:
+            # the shape of an idle surface has no effect
+            rows.append(Stop(thickness=surface.thickness))
+        elif before is None:
+            rows += [Stop(), surface]
+            remarks.append(f"surface {row.number} is the stop and refracts: the stop is placed in front of it")
+        elif behind is None:
+            rows += [surface.replace(thickness=0.0), Stop(thickness=surface.thickness)]
+            remarks.append(f"surface {row.number} is the stop and refracts: the stop is placed behind it")
+        else:
+            raise LensError(f"{raw.file}: surface {row.number}: the stop stands inside glass: move it into an air gap")
+        before = behind
+    return rows
+
+
+def _order(raw: RawSequence, draft: Lens) -> FirstOrder:
+    try:
+        return first_order(draft)
+    except LensError as error:
+        raise LensError(f"{raw.file}: {str(error).removeprefix(f'{draft.name}: ')}") from None
+
+
+def _f_number(raw: RawSequence, order: FirstOrder, remarks: list[str]) -> float:
+    if raw.f_number is not None:
+        return raw.f_number
+    if raw.entrance_pupil_diameter is not None:
+        return order.efl / raw.entrance_pupil_diameter
+    if raw.stop_semi_diameter is None:
+        raise LensError(f"{raw.file}: the aperture is not specified: set FNUM, ENPD or the stop's semi-diameter")
+    found = TRIAL * order.stop_semi_diameter / raw.stop_semi_diameter
+    remarks.append(f"the stop's semi-diameter of {raw.stop_semi_diameter:g} mm gives f/{found:.2f}")
+    return found
+
+
+def _field_deg(raw: RawSequence, order: FirstOrder) -> float | None:
+    if raw.image_height is not None:
+        return degrees(atan(raw.image_height / order.efl))
+    return raw.field_deg
+
+
+def _remark_image(last: SequenceRow, order: FirstOrder, remarks: list[str]) -> None:
+    gap = last.surface.thickness
+    if abs(gap - order.bfl) > IMAGE_OFF * order.efl:
+        remarks.append(
+            f"the file's image lies {gap:.2f} mm behind the last surface, {gap - order.bfl:+.2f} mm from the paraxial "
+            f"focus ({order.bfl:.2f}); the sensor is placed at the focus"
+        )
+
+
+def _within_spheres(rows: list[Row], remarks: list[str]) -> list[Row]:
+    """Remove semi-diameters beyond the equator of their surface; estimates replace them."""
+    kept: list[Row] = []
+    for k, row in enumerate(rows):
+        if isinstance(row, Surface) and row.semi_diameter is not None and row.semi_diameter > row.equator:
+            remarks.append(
+                f"row {k}: a rim of {row.semi_diameter:g} mm does not fit a surface that ends {row.equator:g} mm from "
+                "the axis; using an estimate"
+            )
+            kept.append(row.replace(semi_diameter=None))
+        else:
+            kept.append(row)
+    return kept
+
+
+def _remark_rims(kept: list[SequenceRow], remarks: list[str]) -> None:
+    rows = [str(row.number) for row in kept if row.automatic_rim and not row.stop and row.surface.semi_diameter]
+    if rows:
+        remarks.append(
+            f"the rims of surface{'s'[: len(rows) > 1]} {', '.join(rows)} just pass the file's own fields: the program "
+            "that wrote the file chose them, not the maker"
+        )

@@ -1,0 +1,184 @@
+"""The shape of a light: its outline in field angles, and its division into parts traced as one direction each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan, ceil, cos, degrees, hypot, pi, radians, sin, tan
+
+import numpy as np
+
+from ...errors import ProjectError
+from ...model import Light
+from ...model.project.light import LEAST_LIGHT_DEG, Rectangle
+from ...typing import Floats
+from .polygon import centroid, closed, content, solid_angle
+
+# corners of the polygon that replaces a disc
+ROUND = 32
+# largest field angle of a corner, degrees
+WIDEST_DEG = 89.0
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a light, traced as one direction.
+
+    Attributes
+    ----------
+    field_deg : tuple of float
+        Field angles of its centroid.
+    share : float
+        Its fraction of the light's irradiance on a plane that faces each part.
+    corners : ndarray, shape (N, 2)
+        Its outline, counter-clockwise: slopes (tan X, tan Y) relative to the centroid's.
+    """
+
+    field_deg: tuple[float, float]
+    share: float
+    corners: Floats
+
+    @property
+    def slope(self) -> Floats:
+        """The slopes of the centroid, shape (2,)."""
+        return np.tan(np.radians(self.field_deg))
+
+
+def light_outline(light: Light) -> Floats | None:
+    """Return the outline of a light.
+
+    Parameters
+    ----------
+    light : Light
+
+    Returns
+    -------
+    ndarray, shape (N, 2), or None
+        Slopes (tan X, tan Y) of its field angles, counter-clockwise; None for a point.
+
+    Raises
+    ------
+    ProjectError
+        When a part of it lies beside or behind the camera, or when its area is 0 or its edges cross.
+    """
+    if not light.extended:
+        return None
+    if light.shape is None:
+        corners = _disc(light)
+    else:
+        if isinstance(light.shape, Rectangle):
+            half_x, half_y = (0.5 * size for size in light.shape.size_deg)
+            turn = radians(light.shape.rotation_deg)
+            square = np.array([[-half_x, -half_y], [half_x, -half_y], [half_x, half_y], [-half_x, half_y]])
+            offsets = square @ np.array([[cos(turn), sin(turn)], [-sin(turn), cos(turn)]])
+        else:
+            offsets = np.array(light.shape.corners_deg)
+            least = max(1e-9 * float(np.ptp(offsets, axis=0).max()) ** 2, LEAST_LIGHT_DEG**2)
+            if abs(content(closed(offsets))) < least:
+                raise ProjectError(f"the light {light.name!r} has no area; give corners that enclose an area")
+        angles = np.array(light.field_deg) + offsets
+        if np.abs(angles).max() > WIDEST_DEG:
+            raise ProjectError(
+                f"the light {light.name!r} reaches beside or behind the camera; its corners must stay within "
+                f"{WIDEST_DEG:g} degrees"
+            )
+        corners = np.tan(np.radians(angles))
+        if _crosses_itself(corners):
+            raise ProjectError(
+                f"the light {light.name!r} has edges that cross each other; give its corners in order around it"
+            )
+    area = content(closed(corners))
+    return corners if area > 0.0 else corners[::-1].copy()
+
+
+def _crosses_itself(corners: Floats) -> bool:
+    """Return whether two edges of a polygon cross."""
+    ends = np.roll(corners, -1, axis=0)
+
+    def side(points: Floats) -> Floats:
+        # twice the area of the triangles of each edge (rows) and each point (columns)
+        along, to = ends - corners, points[None] - corners[:, None]
+        return np.asarray(along[:, None, 0] * to[..., 1] - along[:, None, 1] * to[..., 0])
+
+    apart = side(corners) * side(ends) < 0.0
+    return bool((apart & apart.T).any())
+
+
+def _disc(light: Light) -> Floats:
+    """Return directions half the diameter from the centre, as a polygon of the disc's area."""
+    step = 2.0 * pi / ROUND
+    half = radians(0.5 * light.diameter_deg) * (step / sin(step)) ** 0.5
+    slopes = [tan(radians(angle)) for angle in light.field_deg]
+    if atan(hypot(*slopes)) + half > radians(WIDEST_DEG):
+        raise ProjectError(
+            f"the light {light.name!r} reaches beside or behind the camera; its disc must stay within "
+            f"{WIDEST_DEG:g} degrees"
+        )
+    middle = np.array([*slopes, 1.0])
+    middle /= np.linalg.norm(middle)
+    across = np.cross([0.0, 1.0, 0.0], middle)
+    across /= np.linalg.norm(across)
+    up = np.cross(middle, across)
+    angle = step * np.arange(ROUND)
+    rim = cos(half) * middle + sin(half) * (np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * up)
+    return np.asarray(rim[:, :2] / rim[:, 2:])
+
+
+def parts(light: Light, step_deg: float) -> tuple[Part, ...]:
+    """Divide a light into parts no wider than a step.
+
+    Parameters
+    ----------
+    light : Light
+    step_deg : float
+
+    Returns
+    -------
+    tuple of Part
+        Their shares add to 1; one part, without corners, for a point.
+
+    Raises
+    ------
+    ProjectError
+        As `light_outline`.
+
+    Notes
+    -----
+    The light's radiance is uniform, so a part's share is its fraction of the solid angle.
+    """
+    corners = light_outline(light)
+    if corners is None:
+        return (Part(light.field_deg, 1.0, np.zeros((0, 2))),)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    counts = [max(1, ceil((high[k] - low[k]) / tan(radians(step_deg)) - 1e-9)) for k in (0, 1)]
+    edges = [np.linspace(low[k], high[k], counts[k] + 1) for k in (0, 1)]
+    found = []
+    for a in range(counts[0]):
+        for b in range(counts[1]):
+            cell = corners
+            for axis, k in ((0, a), (1, b)):
+                cell = _cut(cell, axis, edges[axis][k], 1.0)
+                cell = _cut(cell, axis, edges[axis][k + 1], -1.0)
+            area = content(closed(cell)) if len(cell) > 2 else 0.0
+            if area > 1e-9 * abs(content(closed(corners))):
+                found.append((cell, centroid(closed(cell))))
+    weights = np.array([solid_angle(closed(cell)) for cell, _ in found])
+    weights /= weights.sum()
+    return tuple(
+        Part((degrees(atan(middle[0])), degrees(atan(middle[1]))), float(share), cell - middle)
+        for (cell, middle), share in zip(found, weights, strict=True)
+    )
+
+
+def _cut(corners: Floats, axis: int, at: float, side: float) -> Floats:
+    """Clip a polygon at a line across an axis (Sutherland and Hodgman 1974); `side` 1 keeps the part above."""
+    if len(corners) == 0:
+        return corners
+    value = side * (corners[:, axis] - at)
+    kept = []
+    for k in range(len(corners)):
+        m = (k + 1) % len(corners)
+        if value[k] >= 0.0:
+            kept.append(corners[k])
+        if (value[k] > 0.0 > value[m]) or (value[k] < 0.0 < value[m]):
+            kept.append(corners[k] + value[k] / (value[k] - value[m]) * (corners[m] - corners[k]))
+    return np.array(kept).reshape(-1, 2)

@@ -1,0 +1,130 @@
+"""Colour errors of paths whose throughput changes fast between the traced wavelengths, and their correction.
+
+Rays are traced at few wavelengths because geometry changes slowly. Slivers are an exception: their light passes the
+rims, or lands in the picture, only at one end of the spectrum, and linear interpolation between wavelengths fails.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from ...typing import Floats, Mask
+from ..colour.spectrum import hats
+from .path_reflectance import CURVE_NM
+
+# a wavelength with less than this fraction of the largest throughput cannot represent its neighbours
+LEAST_PART = 1e-3
+# the error is estimated at every third wavelength
+EVERY = 3
+
+__all__ = ["bright_wavelengths", "interpolation_error", "throughput_ratios"]
+
+
+def interpolation_error(
+    passed: Floats, light: Floats, known_nm: Floats, throughput: Floats, beyond: tuple[int, int] = (0, 0)
+) -> tuple[Floats, Floats]:
+    """Estimate the colour error of a path from linear throughput between the traced wavelengths.
+
+    Parameters
+    ----------
+    passed : ndarray, shape (..., L)
+        Fraction of the light that coatings pass, at `CURVE_NM`.
+    light : ndarray, shape (L, 3)
+        The light in each channel.
+    known_nm : ndarray, shape (W,)
+        The traced wavelengths and `beyond` others, ascending.
+    throughput : ndarray, shape (..., W)
+        At `known_nm`.
+    beyond : tuple of int
+        How many of `known_nm` lie below and above the traced ones.
+
+    Returns
+    -------
+    error, total : ndarray, shape (...)
+        The largest error of a channel, and the largest channel.
+
+    Notes
+    -----
+    The reference is the cubic spline through the same values, with linear ends: its distance from the line is the
+    leading term of the error.
+    """
+    straight, bent = _interpolations(tuple(known_nm), beyond)
+    passed, light = passed[..., ::EVERY], light[::EVERY]
+    # not `@`, whose library threads busy-wait next to ours
+    line = np.einsum("...w,wl->...l", throughput, straight)
+    more = np.maximum(np.einsum("...w,wl->...l", throughput, bent), 0.0) - line
+    error, total = (np.abs(np.einsum("...l,lc->...c", one * passed, light)).max(axis=-1) for one in (more, line))
+    return error, total
+
+
+@lru_cache(maxsize=64)
+def _interpolations(known_nm: tuple[float, ...], beyond: tuple[int, int]) -> tuple[Floats, Floats]:
+    """Return the interpolation matrices from wavelengths to the curve, linear between traced ones and cubic, (W, L)."""
+    nodes, curve_nm = np.array(known_nm), CURVE_NM[::EVERY]
+    straight = hats(curve_nm, nodes)
+    if len(nodes) == 1:
+        return straight, straight
+    # second derivatives from values, 0 at the ends (de Boor 2001, chapter IV); importing SciPy's takes longer than
+    # drawing a draft
+    gap = np.diff(nodes)
+    slope = (np.eye(len(nodes))[1:] - np.eye(len(nodes))[:-1]) / gap[:, None]
+    system = np.eye(len(nodes))
+    for k in range(1, len(nodes) - 1):
+        system[k, k - 1 : k + 2] = gap[k - 1] / 6.0, (gap[k - 1] + gap[k]) / 3.0, gap[k] / 6.0
+    second = np.linalg.solve(system, np.pad(np.diff(slope, axis=0), ((1, 1), (0, 0))))
+    cell = np.clip(np.searchsorted(nodes, curve_nm) - 1, 0, len(gap) - 1)
+    width, ahead = gap[cell, None], (curve_nm - nodes[cell])[:, None]
+    behind = width - ahead
+    within = (curve_nm >= nodes[0]) & (curve_nm <= nodes[-1])
+    cubic = (behind**3 / width - behind * width) * second[cell] + (ahead**3 / width - ahead * width) * second[cell + 1]
+    bent = straight.T + np.where(within[:, None], cubic / 6.0, 0.0)
+    # the ends continue with their slope
+    low, high = slope[0] - gap[0] / 6.0 * second[1], slope[-1] + gap[-1] / 6.0 * second[-2]
+    bent += np.minimum(curve_nm - nodes[0], 0.0)[:, None] * low + np.maximum(curve_nm - nodes[-1], 0.0)[:, None] * high
+    straight = np.pad(hats(curve_nm, nodes[beyond[0] : len(nodes) - beyond[1]]), (beyond, (0, 0)))
+    return straight, np.ascontiguousarray(bent.T)
+
+
+def throughput_ratios(
+    lit: Mask, traced_nm: Floats, throughput: Floats, fine_nm: Floats, fine: Floats
+) -> tuple[Floats, Floats]:
+    """Split the throughput at all wavelengths over traced ones whose throughput is known only at themselves.
+
+    Parameters
+    ----------
+    lit : ndarray, shape (W,), bool
+        Which traced wavelengths have enough throughput in all paths to represent their neighbours and the bands of
+        traced wavelengths that do not.
+    traced_nm : ndarray, shape (W,)
+        Ascending.
+    throughput : ndarray, shape (P, W)
+        Of paths, at the traced wavelengths.
+    fine_nm : ndarray, shape (M,)
+        Ascending.
+    fine : ndarray, shape (P, M)
+        Throughput at `fine_nm`; linear between, constant beyond.
+
+    Returns
+    -------
+    shares : ndarray, shape (W, L)
+        Split of each wavelength of `CURVE_NM` over the traced ones; 0 for those that are not lit.
+    ratios : ndarray, shape (P, L)
+        Correction factors: ratios times shares times `throughput`, summed over W, is `fine`.
+    """
+    shares = np.zeros((len(traced_nm), len(CURVE_NM)))
+    shares[lit] = _hats(tuple(traced_nm[lit]))
+    known = np.einsum("pw,wl->pl", throughput, shares)
+    return shares, np.einsum("pm,ml->pl", fine, _hats(tuple(fine_nm))) / known
+
+
+@lru_cache(maxsize=64)
+def _hats(nodes_nm: tuple[float, ...]) -> Floats:
+    return hats(CURVE_NM, nodes_nm)
+
+
+def bright_wavelengths(throughput: Floats, fine: Floats) -> Mask:
+    """Return which traced wavelengths have enough throughput, shape (P, W); arguments as in `throughput_ratios`."""
+    lit: Mask = throughput > LEAST_PART * fine.max(axis=1, keepdims=True)
+    return lit

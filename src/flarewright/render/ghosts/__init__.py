@@ -1,0 +1,23 @@
+"""The ghost pass, in draft quality (paraxial matrices) and final quality (traced ray bundles).
+
+`ghost_pass` distributes paths over threads, calls the drawing code of either quality for each path and light, and adds
+the pictures in a fixed order.
+
+Modules:
+
+- `ghost_pass`: `render_ghosts`, `GhostPass`, `plain_level`: the entry points
+- `final_pass`: `FinalPass`, one path of one light, ready to be drawn
+- `pupil_search`: `ghost_search`: search the accepted pupil of every path and light
+- `traced_ghosts`: `find_final`, `draw_final`, `draw_alone`: ghosts in final quality
+- `paraxial_ghosts`: `draw_draft` and others: ghosts in draft quality
+- `steep_ghosts`: correct colours of ghosts whose throughput changes fast with wavelength
+- `wavelength_subset`: `gathered_weights`: draw faint ghosts at few wavelengths
+- `diffraction_rings`: `ringing_for`, `Rings`: diffraction patterns of the iris inside ghosts
+- `ring_tables`: patterns from tables of straight edges and corners
+- `ring_flux`: `ring_flux`: the factor that keeps the flux of a ghost with rings
+- `ring_visibility`: `ripples_seen`: whether rings are visible
+- `background_level`: `surroundings`: coarse picture of the light around each ghost
+- `visible_stop`: `seen_in_stop`: the part of the stop that a picture shows
+- `extent_blur`: `blur_by_extent`, `shape_kernel`: convolution with the shape of a light or of a defocused aperture
+- `art_filters`: `filtered_ghost`: colour ramps and blurs of art direction
+"""

@@ -1,0 +1,519 @@
+"""Ghosts in draft quality: paraxial matrices (Lee and Eisemann 2013; Van Acoleyen 2025, chapter 4).
+
+Drafts use the paths, wavelengths, iris and units of final quality, but take milliseconds: every ghost is the uniformly
+lit image of the entrance, cut by the iris, with the colour of one ray. A toroid has one matrix per meridian, so its
+ghosts are ovals. Decentre, tilt, aspheric terms and figure errors are of higher order and ignored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...kernels.paraxial.ghosts import RIM, draw_matrix_ghosts, matrix_squares, measure_matrix_ghosts
+from ...kernels.raster.edge_blur import spread_marks
+from ...kernels.raster.polygons import sum_rows
+from ...optics.colour.rgb import luminance_weights
+from ...optics.colour.spectrum import hats
+from ...optics.lens.paths import LightPath
+from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum, joined_steps, path_products, path_spectra
+from ...typing import Floats, Indices
+from ..image.canvas import DETAIL_CONTRAST, DETAILS, Plane, merge
+from ..scene.art_rules import PathArt
+from ..scene.between_wavelengths import BEYOND, FINE_NM, NEAREST, STEEP
+from ..scene.paraxial_place import ghost_frame
+from ..scene.shot import Shot, at_fine_wavelengths
+from .art_filters import coarseness, filtered_ghost
+from .extent_blur import shape_kernel, spread_within
+from .steep_ghosts import (
+    DARK_PART,
+    FAINT_PART,
+    abrupt_ends,
+    bent_weights,
+    light_up_to_its_end,
+    near_ends,
+    over,
+    steep_paths,
+)
+
+# rounding error of sums of differences, relative to the largest value
+ROUNDING = 1e-12
+# a ray with less than this part of the light is totally reflected somewhere
+LEAST_CARRIED = 1e-13
+# an offset larger than the distance of any ghost from the picture, pixels
+FAR_PX = 10**7
+# straight edges of the round entrance for comparing fluxes
+ENTRANCE_SIDES = 12
+
+
+def draw_draft(
+    shot: Shot, paths: Sequence[LightPath], differences: Floats, colors: Floats | None = None, first_row: int = 0
+) -> None:
+    """Mark the paraxial ghosts of paths in a picture of differences.
+
+    Parameters
+    ----------
+    shot : Shot
+    paths : sequence of LightPath
+    differences : ndarray, shape (H, W, 3), float64
+        Added to; `kernels.raster.polygons.sum_rows` turns it into flux per pixel.
+    colors : ndarray, shape (P, W, 3), optional
+        From `draft_colors`, possibly changed by art rules, with or without `FINE_NM`; None: computed.
+    first_row : int
+        First row of the picture that `differences` holds, if it is a band.
+    """
+    if not paths:
+        return
+    packed, opening = shot.packed, shot.opening
+    steps, view, axes = _steps(shot, paths)
+    colors = draft_colors(shot, paths) if colors is None else colors
+    colors, more = colors[:, : len(packed.n_gap)], colors[:, len(packed.n_gap) :]
+    hidden = np.flatnonzero(more.any(axis=(1, 2)))
+    if hidden.size > 0:
+        lit = np.flatnonzero(more.any(axis=(0, 2)))
+        waves, fine = slice(lit[0], lit[-1] + 1), at_fine_wavelengths(shot)
+        few = replace(fine.packed, n_gap=fine.packed.n_gap[waves], reflectance=fine.packed.reflectance[waves])
+        own = [paths[int(k)] for k in hidden]
+        draw_draft(replace(fine, packed=few), own, differences, more[hidden, waves], first_row)
+    # each other memory layout would compile another kernel
+    colors = np.ascontiguousarray(colors)
+    draw_matrix_ghosts(
+        *steps, packed.n_gap, packed.reflectance, packed.sensor_z, *view, opening.edges, opening.radius,
+        opening.levels, axes, shot.to_pixels - [0.0, first_row, 0.0, 0.0], shot.gain, colors, differences,
+    )  # fmt: skip
+
+
+def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
+    """Return the weight of each traced wavelength of each path in each channel.
+
+    Parameters
+    ----------
+    shot : Shot
+    paths : sequence of LightPath
+        Of two reflections each.
+
+    Returns
+    -------
+    ndarray, shape (P, W, 3)
+        If a path is dark at all traced wavelengths and not beyond them, the weights at `FINE_NM` follow: (P, W + M, 3).
+    """
+    packed = shot.packed
+    if not paths:
+        return np.zeros((0, len(packed.wavelengths_nm), 3))
+    spectra, squares = _spectra(shot, paths)
+    plain = shot.weights(packed.wavelengths_nm, spectra)
+    colors = np.repeat(plain[None], len(paths), axis=0) if spectra is None else plain
+    if shot.between is None:
+        return colors
+    flux = _fluxes(shot, paths, packed.n_gap, packed.reflectance)
+    throughput = flux if spectra is None else over(flux, spectra.carried)
+    beyond, carried = _fine_flux(shot, paths, squares, BEYOND)
+    known_nm, known = _merged((packed.wavelengths_nm, throughput), (FINE_NM[BEYOND], over(beyond, carried)))
+    starts = joined_steps(tuple(paths))[2]
+    for chosen, much in zip(steep_paths(shot, known_nm, known, spectra), (False, True), strict=True):
+        if chosen.size == 0:
+            continue
+        few = [paths[int(k)] for k in chosen]
+        own = None if spectra is None else PathSpectrum(spectra.passed[chosen], spectra.carried[chosen])
+        angles = squares if spectra is None else np.concatenate([squares[starts[k] : starts[k + 1]] for k in chosen])
+        if much:
+            # how much of a sliver lands in the picture depends on the polygon: take the one that is drawn
+            drawn = _fluxes(shot, few, packed.n_gap, packed.reflectance, RIM)
+            traced, fine = drawn if own is None else over(drawn, own.carried), _fine_throughput(shot, few, angles)
+        else:
+            steep = FINE_NM[STEEP], over(*_fine_flux(shot, few, angles, STEEP))
+            traced, fine = throughput[chosen], _merged((known_nm, known[chosen]), steep)
+        colors[chosen] = bent_weights(shot, traced, own, *fine)
+    # flux under total reflection is rounding error
+    light = beyond.max(axis=1)
+    hidden = np.flatnonzero((flux.max(axis=1) < DARK_PART * light) & (light > DARK_PART * FAINT_PART * flux.max()))
+    return colors if hidden.size == 0 else _with_hidden(shot, paths, colors, flux, hidden)
+
+
+def _with_hidden(
+    shot: Shot, paths: Sequence[LightPath], colors: Floats, flux: Floats, hidden: NDArray[np.intp]
+) -> Floats:
+    """Add weights at `FINE_NM` for paths that are dark at all traced wavelengths, unless they are faint there too."""
+    fine = at_fine_wavelengths(shot)
+    flux_there = _fluxes(fine, [paths[int(k)] for k in hidden], fine.packed.n_gap, fine.packed.reflectance, RIM)
+    light, beyond = (
+        np.abs((of[:, :, None] * in_channels).sum(axis=1)).max(axis=1)
+        for of, in_channels in ((flux, colors), (flux_there, fine.weights(FINE_NM)))
+    )
+    seen = beyond > FAINT_PART * light.max()
+    if not seen.any():
+        return colors
+    hidden, flux_there = hidden[seen], flux_there[seen]
+    few = [paths[int(k)] for k in hidden]
+    spectra, squares = _spectra(fine, few)
+    throughput = flux_there if spectra is None else over(flux_there, spectra.carried)
+    more, colors = np.zeros((len(paths), len(FINE_NM), 3)), colors.copy()
+    more[hidden] = bent_weights(fine, throughput, spectra, *_fine_throughput(shot, few, squares))
+    colors[hidden] = 0.0
+    return np.concatenate([colors, more], axis=1)
+
+
+def _merged(one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Join values at some wavelengths, (N,) and (P, N), with those at others, rising."""
+    nm, order = np.unique(np.concatenate([one[0], other[0]]), return_index=True)
+    return nm, np.concatenate([one[1], other[1]], axis=1)[:, order]
+
+
+def _fine_flux(
+    shot: Shot, paths: Sequence[LightPath], squares: Floats, waves: Sequence[int], sides: int = ENTRANCE_SIDES
+) -> tuple[Floats, Floats]:
+    """Compute the flux of paths at some of `FINE_NM`, and what rays carry there.
+
+    Parameters
+    ----------
+    shot : Shot
+    paths : sequence of LightPath
+    squares : ndarray
+        Angles of their rays, as `path_products` takes them.
+    waves : sequence of int
+    sides : int
+        As in `_fluxes`.
+
+    Returns
+    -------
+    flux, carried : ndarray, shape (P, M)
+    """
+    assert shot.between is not None
+    fine, bands = shot.between.finer
+    flux = _fluxes(shot, paths, fine.n_gap[waves], [fine.reflectance[w] for w in waves], sides)
+    return flux, np.ones_like(flux) if bands is None else path_products(bands.means[:, :, waves], paths, squares[None])
+
+
+def _fine_throughput(shot: Shot, paths: Sequence[LightPath], squares: Floats) -> tuple[Floats, Floats]:
+    """Compute the throughput of paths at `FINE_NM`, or at `CURVE_NM` where the light of a path ends.
+
+    Parameters
+    ----------
+    shot : Shot
+    paths : sequence of LightPath
+    squares : ndarray
+        As in `_fine_flux`.
+
+    Returns
+    -------
+    fine_nm : ndarray, shape (M,)
+    throughput : ndarray, shape (P, M)
+    """
+    assert shot.between is not None
+    fine, n_gap = shot.between.finer[0], shot.between.curve_indices
+    flux, carried = _fine_flux(shot, paths, squares, range(len(FINE_NM)), RIM)
+    throughput = over(flux, carried)
+    rises, falls = abrupt_ends(throughput)
+    ended = np.flatnonzero((rises | falls).any(axis=1))
+    if ended.size == 0:
+        return FINE_NM, throughput
+
+    # rays carry nearly the same as at the nearest fine wavelength
+    more = near_ends(FINE_NM, rises, falls)
+    near = NEAREST[more]
+    found = _fluxes(shot, [paths[int(k)] for k in ended], n_gap[more], [fine.reflectance[w] for w in near], RIM)
+    curve = throughput @ hats(CURVE_NM, FINE_NM)
+    curve[np.ix_(ended, more)] = over(found, carried[np.ix_(ended, near)])
+    # a curve's wavelengths lie too far apart to resolve an end
+    at_curve = curve.copy()
+    for gaps, bright, dark in zip(abrupt_ends(at_curve), (1, 0), (0, 1), strict=True):
+        for k, m in np.argwhere(gaps).tolist():
+            low, high = m + bright, m + dark
+
+            def at(part: float, path: int = k, low: int = low, high: int = high) -> float:
+                indices, w = n_gap[low] + part * (n_gap[high] - n_gap[low]), int(NEAREST[low])
+                flux = _fluxes(shot, [paths[path]], indices[None], [fine.reflectance[w]], RIM)
+                return float(flux[0, 0] / carried[path, w])
+
+            lit, unlit = light_up_to_its_end(at_curve[k, low], at)
+            # by linear interpolation each bound has half of its value
+            curve[k, low] += lit - 0.5 * at_curve[k, low]
+            curve[k, high] += unlit
+    return CURVE_NM, curve
+
+
+def _spectra(shot: Shot, paths: Sequence[LightPath]) -> tuple[PathSpectrum | None, Floats]:
+    """Compute what coatings pass along paths, and the angles of the rays used for it.
+
+    The angles are joined as `path_spectra` takes them.
+    """
+    if shot.curves is None:
+        return None, np.empty(0)
+    middle = len(shot.packed.n_gap) // 2
+    squares = _squares(shot, paths, middle)
+    spectra = path_spectra(shot.curves, paths, squares[None])
+    # a ray can be totally reflected at one wavelength but not at another
+    starts = joined_steps(tuple(paths))[2]
+    for w in sorted(range(len(shot.packed.n_gap)), key=lambda w: abs(w - middle))[1:]:
+        dark = np.flatnonzero(spectra.carried.max(axis=1) < LEAST_CARRIED)
+        if dark.size == 0:
+            break
+        few = [paths[int(k)] for k in dark]
+        other = _squares(shot, few, w)
+        squares[np.concatenate([np.arange(starts[k], starts[k + 1]) for k in dark])] = other
+        found = path_spectra(shot.curves, few, other[None])
+        spectra.passed[dark], spectra.carried[dark] = found.passed, found.carried
+    return spectra, squares
+
+
+def _squares(shot: Shot, paths: Sequence[LightPath], w: int) -> Floats:
+    """Compute the angles of one ray of each path at a traced wavelength."""
+    steps, view, _ = _steps(shot, paths)
+    squares = np.empty(len(steps[0]))
+    matrix_squares(*steps, shot.packed.n_gap[w], shot.packed.sensor_z, *view, shot.opening.radius, squares)
+    return squares
+
+
+def _fluxes(
+    shot: Shot, paths: Sequence[LightPath], n_gap: Floats, reflectance: Floats | list[Floats],
+    sides: int = ENTRANCE_SIDES,
+) -> Floats:  # fmt: skip
+    """Compute the flux of each ghost in the picture at some wavelengths, per unit irradiance, shape (P, M).
+
+    `n_gap` and `reflectance` are as in `PackedLens`, at these wavelengths; `sides` are the edges of the round entrance.
+    For an area light the flux counts everywhere, because its spread brings light from beside the picture into it.
+    """
+    packed, opening = shot.packed, shot.opening
+    steps, view, axes = _steps(shot, paths)
+    to_pixels, (width, height) = shot.to_pixels, shot.size_px
+    if shot.border is not None:
+        to_pixels = to_pixels + np.array([FAR_PX, FAR_PX, 0.0, 0.0])
+        width, height = 2 * FAR_PX, 2 * FAR_PX
+    found, seen = np.empty((len(paths), len(n_gap))), np.empty((len(paths), 2))
+    for m in range(len(n_gap)):
+        measure_matrix_ghosts(
+            *steps, n_gap[m], reflectance[m], packed.sensor_z, *view, opening.edges, opening.radius, axes,
+            to_pixels, 1.0, float(width), float(height), sides, seen,
+        )  # fmt: skip
+        found[:, m] = seen[:, 0]
+    return found
+
+
+def _steps(shot: Shot, paths: Sequence[LightPath]) -> tuple[tuple[Any, ...], tuple[float, float, float, float], Floats]:
+    """Return the kernel arguments of paths; of the incoming light (entrance, slopes, nearness); and the axes."""
+    packed = shot.packed
+    slope, axes = float(np.tan(shot.incidence.tilt)), shot.incidence.axes
+    slope_x, nearness = 0.0, packed.nearness / shot.incidence.tilt_cosine
+    if packed.curvature_x is not None:
+        # the two meridians are those of the lens, not of the light
+        slope_x, slope = float(axes[1, 0]) * slope, float(axes[1, 1]) * slope
+        axes = np.eye(2)
+    steps = (*_joined_paths(tuple(paths)), packed.curvature, packed.curvature_x, packed.z_vertex)
+    return steps, (float(packed.semi[packed.first_surface]), slope, slope_x, nearness), axes
+
+
+# drags repeat the same paths
+@lru_cache(maxsize=64)
+def _joined_paths(paths: tuple[LightPath, ...]) -> tuple[Indices, ...]:
+    """Join rows and actions of paths; return them with the start of each path and its number of stop crossings."""
+    return *joined_steps(paths), np.array([path.stop_crossings for path in paths])
+
+
+def downsampled(shot: Shot, times: int) -> Shot:
+    """Return a shot whose resolution is `times` times smaller."""
+    size = (-(-shot.size_px[0] // times), -(-shot.size_px[1] // times))
+    return replace(shot, to_pixels=shot.to_pixels / times, size_px=size)
+
+
+def weigh_drafts(shot: Shot, paths: Sequence[LightPath], colors: Floats) -> Floats:
+    """Return the brightness of the ghosts of `draw_draft`, computed at the middle wavelength.
+
+    Parameters
+    ----------
+    shot : Shot
+    paths : sequence of LightPath
+    colors : ndarray, shape (len(paths), W, 3)
+        As in `draw_draft`.
+
+    Returns
+    -------
+    ndarray, shape (len(paths), 2)
+        Luminance of the light in the picture, and of one pixel of the ghost; 0 for a ghost that misses the picture.
+    """
+    packed, opening = shot.packed, shot.opening
+    steps, view, axes = _steps(shot, paths)
+    middle = len(packed.n_gap) // 2
+    width, height = shot.size_px
+    seen = np.empty((len(paths), 2))
+    measure_matrix_ghosts(
+        *steps, packed.n_gap[middle], packed.reflectance[middle], packed.sensor_z, *view, opening.edges, opening.radius,
+        axes, shot.to_pixels, shot.gain, float(width), float(height), RIM, seen,
+    )  # fmt: skip
+    light: Floats = colors.sum(axis=1) @ luminance_weights(shot.colorspace)
+    return seen * light[:, None]
+
+
+def draft_details(shots: Sequence[Shot], paths: Sequence[LightPath], colors: Sequence[Floats]) -> Indices:
+    """Return how often the resolution can be halved for each ghost among many.
+
+    Parameters
+    ----------
+    shots : sequence of Shot
+    paths : sequence of LightPath
+    colors : sequence of ndarray, shape (len(paths), W, 3)
+        One per shot, as `draw_draft` takes them.
+
+    Returns
+    -------
+    ndarray, shape (len(shots), len(paths))
+
+    Notes
+    -----
+    As in final quality (docs/adr/0003), except that each path's irradiance is computed once, for the light with the
+    median field angle at the middle wavelength, and scaled by each light's intensity.
+    """
+    middle = sorted(range(len(shots)), key=lambda k: shots[k].incidence.tilt)[len(shots) // 2]
+    shot = shots[middle]
+    seen = weigh_drafts(shot, paths, colors[middle])
+    width, height = shot.size_px
+    # relative to the weighed light; if that is dark, every contrast stays infinite
+    power = np.array([each.light.intensity for each in shots]) / (shot.light.intensity or 1.0)
+    level = power.sum() * seen[:, 0].sum() / (width * height)
+    contrast = np.full((len(shots), len(paths)), np.inf)
+    # ghosts that are dark at the middle wavelength keep infinite contrast
+    known = seen[:, 1] > 0.0
+    if level > 0.0:
+        contrast[:, known] = power[:, None] * seen[known, 1] / level
+    details: Indices = np.sum([contrast < limit for limit in DETAIL_CONTRAST], axis=0)
+    return details
+
+
+def draw_draft_by_detail(
+    shot: Shot, paths: Sequence[LightPath], details: Indices, pyramid: list[Floats | None], colors: Floats
+) -> None:
+    """Mark paraxial ghosts, each at its own resolution.
+
+    Parameters
+    ----------
+    shot : Shot
+    paths : sequence of LightPath
+    details : ndarray, shape (len(paths),)
+        How often the resolution of each ghost is halved.
+    sheets : list of ndarray or None
+        One per resolution, as `draw_draft` takes them; missing ones are created.
+    colors : ndarray, shape (len(paths), W, 3)
+        As in `draw_draft`.
+    """
+    for detail in range(DETAILS):
+        chosen = np.flatnonzero(details == detail)
+        if chosen.size:
+            small = downsampled(shot, 2**detail)
+            held = pyramid[detail]
+            if held is None:
+                held = pyramid[detail] = np.zeros((small.size_px[1], small.size_px[0], 3))
+            draw_draft(small, [paths[int(k)] for k in chosen], held, colors[chosen])
+
+
+def draw_overridden_draft(shot: Shot, path: LightPath, art: PathArt, differences: Floats) -> None:
+    """Mark one path with a gain, an offset or a scale; ramps and blurs need `draft_alone`.
+
+    Parameters
+    ----------
+    shot : Shot
+    path : LightPath
+    art : PathArt
+    differences : ndarray, shape (H, W, 3), float64
+        As in `draw_draft`.
+    """
+    moved = replace(shot, to_pixels=art.place(shot.to_pixels, ghost_frame(shot, path) if art.framed else None))
+    draw_draft(moved, [path], differences, draft_colors(moved, [path]) * art.rgb)
+
+
+def draft_alone(
+    ghosts: Sequence[tuple[Shot, LightPath]], art: Sequence[PathArt], source: Floats | None = None, halved: int = 0
+) -> Floats:
+    """Draw ghosts on a separate plane, then spread, ramp and blur it.
+
+    Parameters
+    ----------
+    ghosts : sequence of (Shot, LightPath)
+        One ghost with a ramp, or any number without that share a blur and a source, since both are linear.
+    art : sequence of PathArt
+        One per ghost.
+    source : ndarray, shape (N, 5), or None
+        The shape over which an area light spreads them: columns and rows (`optics.pupil.polygon`).
+    halved : int
+        How often the resolution can be halved because they are spread.
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3)
+        Flux per pixel.
+    """
+    shot, first = ghosts[0][0], art[0]
+    detail = max(halved, coarseness(first, shot.to_pixels) if first.blur > 0.0 else 0)
+    own = shot.to_pixels / 2.0**detail
+    width, height = (-(-side // 2**detail) for side in shot.size_px)
+    mx, my = first.margin(own)
+    kernel = None if source is None else shape_kernel(source, 0.5**detail)
+    if kernel is not None:
+        mx, my = mx + kernel.shape[1] // 2, my + kernel.shape[0] // 2
+    marks = np.zeros((height + 2 * my, width + 2 * mx, 3))
+    frames = [ghost_frame(shot, path) if each.framed else None for (shot, path), each in zip(ghosts, art, strict=True)]
+    places = [each.place(shot.to_pixels, frame) / 2.0**detail for each, frame in zip(art, frames, strict=True)]
+    for (lit, path), each, placed in zip(ghosts, art, places, strict=True):
+        moved = replace(lit, to_pixels=placed + np.array([mx, my, 0.0, 0.0]))
+        draw_draft(moved, [path], marks, draft_colors(replace(lit, to_pixels=placed * 2.0**detail), [path]) * each.rgb)
+    sum_rows(marks, marks)
+    if kernel is not None:
+        marks = spread_within(marks, kernel)
+    planes: list[Plane | None] = [None] * DETAILS
+    planes[detail] = filtered_ghost(marks, first, frames[0], places[0], own)
+    return np.asarray(merge(planes, shot.size_px), dtype=np.float64)
+
+
+def mark_spread(
+    ghosts: Sequence[tuple[Shot, LightPath]], art: Sequence[PathArt], source: Floats, halved: int,
+    pyramid: list[Floats | None], scratch: Floats | None = None,
+) -> Floats:  # fmt: skip
+    """Mark paraxial ghosts of an area light that share a spread and have no ramp or blur.
+
+    Parameters
+    ----------
+    ghosts, art, source, halved
+        As in `draft_alone`, without ramps and blurs.
+    sheets : list of ndarray or None
+        One per resolution; missing ones are created. Two calls of `kernels.raster.polygons.sum_rows` turn them into
+        flux per pixel.
+    scratch : ndarray of float64, optional
+        Zeros returned by the previous call, reused if large enough.
+
+    Returns
+    -------
+    ndarray of float64
+        Scratch memory for the next call.
+    """
+    shot = ghosts[0][0]
+    width, height = (-(-side // 2**halved) for side in shot.size_px)
+    kernel = shape_kernel(source, 0.5**halved)
+    my, mx = (side // 2 for side in kernel.shape)
+    sides = height + 2 * my, width + 2 * mx, 3
+    if scratch is None or scratch.size < np.prod(sides):
+        scratch = np.zeros(sides).ravel()
+    marks = scratch[: np.prod(sides)].reshape(sides)
+    for (lit, path), each in zip(ghosts, art, strict=True):
+        placed = each.place(shot.to_pixels, ghost_frame(lit, path) if each.framed else None)
+        moved = replace(lit, to_pixels=placed / 2.0**halved + np.array([mx, my, 0.0, 0.0]))
+        draw_draft(moved, [path], marks, draft_colors(replace(lit, to_pixels=placed), [path]) * each.rgb)
+    held = pyramid[halved]
+    if held is None:
+        held = pyramid[halved] = np.zeros((height, width, 3))
+    steps = np.diff(kernel, axis=1, prepend=0.0, append=0.0)
+    steps[np.abs(steps) < ROUNDING * kernel.max()] = 0.0
+    rows, columns = np.nonzero(steps)
+    spread_marks(marks, rows, columns, steps[rows, columns], np.array([my, mx]), held)
+    return scratch
+
+
+def spread_light(marks: Floats) -> Floats:
+    """Turn a picture marked by `mark_spread` into flux per pixel, in place."""
+    sum_rows(marks, marks)
+    sum_rows(marks, marks)
+    # remove rounding errors of the sums
+    marks[np.abs(marks) < ROUNDING * np.abs(marks).max()] = 0.0
+    return marks

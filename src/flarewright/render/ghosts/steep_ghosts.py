@@ -1,0 +1,330 @@
+"""Colour correction for ghosts whose throughput changes fast between the traced wavelengths.
+
+Final quality draws slivers at more wavelengths; for other steep ghosts it measures the throughput at more wavelengths
+and corrects the colours. Drafts compute the flux in the picture at any wavelength from matrices and do the same. Steep
+are ghosts whose throughput at the traced wavelengths and at the ends of the spectrum lies off the line
+(docs/adr/0037-rays-carry-the-means-of-their-bands.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from itertools import permutations
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...kernels.tracing.representative_rays import passing_area
+from ...kernels.tracing.sequential import ALIVE
+from ...model.project.camera import Colorspace
+from ...model.project.light import Spectrum
+from ...optics.colour.spectrum import band_parts
+from ...optics.rays.bundle import Bundle, trace_bundle
+from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum
+from ...optics.rays.steepness import bright_wavelengths, interpolation_error, throughput_ratios
+from ...typing import Floats, Mask
+from ..scene.between_wavelengths import FINE_NM
+from ..scene.path_color import visible_rays
+from ..scene.shot import Shot
+
+# lowest expected colour error for a correction, relative to the ghost's largest channel
+COLOR_ERROR, DRAFT_COLOR_ERROR = 0.009, 0.0077
+# above this error a few wavelengths do not suffice for the colour correction
+LARGE_ERROR = 0.05
+# a throughput below this part of the largest counts as zero, so the ghost ends within the spectrum
+DARK_PART = 1e-3
+# ghosts whose throughput changes less than this between ends and middle of the spectrum, relative, are not steep
+LEAST_CHANGE = 0.1
+# below this part of the largest throughput, a wavelength does not show the ghost's shape
+SLIVER_PART = 0.2
+# a ghost's light ends abruptly where it is dark at one wavelength and above this part of the largest at the next
+ABRUPT_PART = 0.1
+# drafts do not correct ghosts fainter than this, relative to the largest channel of the brightest
+FAINT_PART = 7e-4
+# steps of the search for an end between two wavelengths of a curve, to 0.08 nm
+BISECTIONS = 5
+# rounding error of a sum of weights that is 1
+ROUNDING = 1e-9
+
+__all__ = [
+    "abrupt_ends",
+    "bent_spectrum",
+    "bent_weights",
+    "light_up_to_its_end",
+    "near_ends",
+    "over",
+    "seen_light",
+    "steep_paths",
+    "steepness",
+]
+
+
+def steepness(
+    shot: Shot, bundle: Bundle, spectrum: PathSpectrum | None, to_pixels: Floats
+) -> Literal["not", "little", "much"]:
+    """Judge whether a ghost's colour is wrong because its throughput is steep between the traced wavelengths.
+
+    Parameters
+    ----------
+    shot : Shot
+    bundle : Bundle
+    spectrum : PathSpectrum or None
+        From `path_color.traced_spectrum`.
+    to_pixels : ndarray, shape (4,)
+        As in `path_color.traced_spectrum`.
+
+    Returns
+    -------
+    str
+        "not": correct, or not visible. "little": only the colour is wrong, because all traced wavelengths show the
+        ghost. "much": a sliver, whose shape some traced wavelengths do not show.
+    """
+    if shot.between is None:
+        return "not"
+    traced_nm = shot.packed.wavelengths_nm
+    known_nm = np.concatenate([FINE_NM[:1], traced_nm, FINE_NM[-1:]])
+    fitted = 1 + np.array(sorted(bundle.traced))
+    few = np.unique([0, *fitted, len(known_nm) - 1])
+    throughput = np.empty(len(known_nm))
+    throughput[few] = first = _areas_between(shot, bundle, known_nm[few], to_pixels)
+    # without a traced wavelength that shows the ghost, extrapolation is too rough to draw it at 21
+    if not first[1:-1].any() or first.max() - first.min() <= LEAST_CHANGE * first.max():
+        return "not"
+    others = np.setdiff1d(np.arange(len(known_nm)), few)
+    throughput[others] = _areas_between(shot, bundle, known_nm[others], to_pixels)
+    passed = np.ones(len(CURVE_NM)) if spectrum is None else spectrum.passed
+    error, total = interpolation_error(passed, seen_light(shot), known_nm, throughput, (1, 1))
+    if not error > COLOR_ERROR * total:
+        return "not"
+    throughput = throughput[1:-1]
+    return "much" if throughput.min() < SLIVER_PART * throughput.max() else "little"
+
+
+def bent_spectrum(
+    shot: Shot, fine: Shot, bundle: Bundle, spectrum: PathSpectrum | None, to_pixels: Floats
+) -> PathSpectrum:
+    """Multiply a ghost's throughput between the traced wavelengths into the spectrum that coatings pass.
+
+    Parameters
+    ----------
+    shot, fine : Shot
+        The drawn shot, and the same at more wavelengths (`shot.at_fine_wavelengths`).
+    bundle : Bundle
+        Of `fine`.
+    spectrum : PathSpectrum or None
+        Of `shot`.
+    to_pixels : ndarray, shape (4,)
+        As in `path_color.traced_spectrum`.
+
+    Returns
+    -------
+    PathSpectrum
+        For `Shot.weights`.
+    """
+    # use one grid for both, so that its errors cancel
+    known, found = (
+        _areas(one, replace(bundle, traced=held), list(range(len(one.packed.wavelengths_nm))), to_pixels)
+        for one, held in ((shot, {}), (fine, bundle.traced))
+    )
+    traced_nm, fine_nm = shot.packed.wavelengths_nm, fine.packed.wavelengths_nm
+    if spectrum is None:
+        spectrum = PathSpectrum(np.ones(len(CURVE_NM)), np.ones(len(traced_nm)))
+    if not known.min() > 0.0:
+        return spectrum
+    _, ratios = throughput_ratios(np.ones(len(traced_nm), dtype=np.bool_), traced_nm, known[None], fine_nm, found[None])
+    return PathSpectrum(spectrum.passed * ratios[0], spectrum.carried)
+
+
+def _areas(shot: Shot, bundle: Bundle, waves: list[int], to_pixels: Floats) -> Floats:
+    """Return the visible area of the pupil at some wavelengths, mm^2, shape (len(waves),)."""
+    seen, tilt = visible_rays(shot, to_pixels), shot.incidence.tilt
+    return np.array([
+        passing_area(bundle.pupil, bundle.triangles, seen(trace_bundle(shot.packed, w, bundle, tilt))) for w in waves
+    ])  # fmt: skip
+
+
+def _areas_between(shot: Shot, bundle: Bundle, wavelengths_nm: Floats, to_pixels: Floats) -> Floats:
+    """As `_areas`, at any wavelengths: rays are interpolated between those of the grid, or extrapolated.
+
+    Indices of glass are nearly linear in 1 / wavelength^2 (Cauchy), and so are rays: through three wavelengths they are
+    polynomials in it.
+    """
+    seen, held = visible_rays(shot, to_pixels), sorted(bundle.traced)
+    held_nm = shot.packed.wavelengths_nm[held]
+    areas = np.empty(len(wavelengths_nm))
+    for k, shares in enumerate(_lagrange(tuple(held_nm**-2.0), tuple(wavelengths_nm**-2.0))):
+        data = bundle.traced[held[int(np.abs(held_nm - wavelengths_nm[k]).argmin())]]
+        if not (shares == 1.0).any():
+            nearest, data = data, shares[0] * bundle.traced[held[0]]
+            with np.errstate(invalid="ignore"):
+                for share, w in zip(shares[1:], held[1:], strict=True):
+                    data += share * bundle.traced[w]
+            # a ray that ends at one wavelength is unknown elsewhere: it counts as at the nearest wavelength
+            ended = ~(np.abs(data[:, ALIVE] - 1.0) < ROUNDING)
+            data[ended] = nearest[ended]
+        areas[k] = passing_area(bundle.pupil, bundle.triangles, seen(data))
+    return areas
+
+
+@lru_cache(maxsize=64)
+def _lagrange(nodes: tuple[float, ...], places: tuple[float, ...]) -> Floats:
+    """Return the weights of values at nodes for the polynomial through them at other places, shape (M, N)."""
+    weights = np.ones((len(places), len(nodes)))
+    for j, k in permutations(range(len(nodes)), 2):
+        weights[:, j] *= (np.array(places) - nodes[k]) / (nodes[j] - nodes[k])
+    return weights
+
+
+def steep_paths(
+    shot: Shot, known_nm: Floats, throughput: Floats, spectra: PathSpectrum | None
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Select the paths whose colours are wrong because their throughput is steep between the traced wavelengths.
+
+    Parameters
+    ----------
+    shot : Shot
+    known_nm : ndarray, shape (W + 2,)
+        The traced wavelengths, one below and one above them.
+    throughput : ndarray, shape (P, W + 2)
+        Flux there over what rays carry.
+    spectra : PathSpectrum or None
+        Of all paths.
+
+    Returns
+    -------
+    a_little, much : ndarray of int
+        Indices by the size of the error; paths much fainter than the brightest are left out.
+    """
+    passed = np.ones(len(CURVE_NM)) if spectra is None else spectra.passed
+    error, total = interpolation_error(passed, seen_light(shot), known_nm, throughput, (1, 1))
+    seen = total > FAINT_PART * total.max(initial=0.0)
+    # a ghost that is dark at one of these wavelengths ends within the spectrum
+    ends = throughput.min(axis=1) < DARK_PART * throughput.max(axis=1)
+    much = seen & (error > np.where(ends, DRAFT_COLOR_ERROR, LARGE_ERROR) * total)
+    return np.flatnonzero(seen & ~much & (error > DRAFT_COLOR_ERROR * total)), np.flatnonzero(much)
+
+
+def bent_weights(shot: Shot, throughput: Floats, spectra: PathSpectrum | None, fine_nm: Floats, fine: Floats) -> Floats:
+    """Return the RGB weights of the traced wavelengths for paths whose throughput is known at many.
+
+    Parameters
+    ----------
+    shot : Shot
+    throughput : ndarray, shape (P, W)
+        Their drawn flux at the traced wavelengths over what rays carry.
+    spectra : PathSpectrum or None
+        Of these paths.
+    fine_nm : ndarray, shape (M,)
+        Rising wavelengths.
+    fine : ndarray, shape (P, M)
+        Their throughput if these wavelengths were traced.
+
+    Returns
+    -------
+    ndarray, shape (P, W, 3)
+        Weights that give the drawn ghosts the correct total light in each channel.
+    """
+    traced_nm, light = shot.packed.wavelengths_nm, seen_light(shot)
+    lit = bright_wavelengths(throughput, fine)
+    weights = np.zeros((*throughput.shape, 3))
+    for which in np.unique(lit[lit.any(axis=1)], axis=0):
+        alike = np.flatnonzero((lit == which).all(axis=1))
+        shares, passed = throughput_ratios(which, traced_nm, throughput[alike], fine_nm, fine[alike])
+        if spectra is not None:
+            passed = passed * spectra.passed[alike]
+        parts = (shares[:, :, None] * light).transpose(1, 0, 2).reshape(len(light), -1)
+        weights[alike] = np.einsum("pl,lk->pk", passed, parts).reshape(len(alike), -1, 3)
+    return weights if spectra is None else over(weights, spectra.carried[..., None])
+
+
+def abrupt_ends(throughput: Floats) -> tuple[Mask, Mask]:
+    """Find where the light of paths ends abruptly between two wavelengths, as under total reflection.
+
+    Parameters
+    ----------
+    throughput : ndarray, shape (P, M)
+        At rising wavelengths.
+
+    Returns
+    -------
+    rises, falls : ndarray, shape (P, M - 1), bool
+        The gaps in which light begins and ends.
+    """
+    most = throughput.max(axis=1, keepdims=True)
+    dark, bright = throughput < DARK_PART * most, throughput > ABRUPT_PART * most
+    return dark[:, :-1] & bright[:, 1:], bright[:, :-1] & dark[:, 1:]
+
+
+def near_ends(fine_nm: Floats, rises: Mask, falls: Mask) -> NDArray[np.intp]:
+    """Return which wavelengths of `CURVE_NM` lie in gaps where light ends, or next to them, where it changes fast.
+
+    Parameters
+    ----------
+    fine_nm : ndarray, shape (M,)
+        Rising.
+    rises, falls : ndarray, shape (P, M - 1), bool
+        From `abrupt_ends`.
+
+    Returns
+    -------
+    ndarray of int
+        Between `fine_nm`, of all paths.
+    """
+    gaps: Mask = np.any(rises | falls, axis=0)
+    gaps[1:] |= rises[:, :-1].any(axis=0)
+    gaps[:-1] |= falls[:, 1:].any(axis=0)
+    within = (fine_nm[0] < CURVE_NM) & (fine_nm[-1] > CURVE_NM)
+    inner = np.flatnonzero(within & ~np.isin(CURVE_NM, fine_nm))
+    found: NDArray[np.intp] = inner[gaps[np.searchsorted(fine_nm, CURVE_NM[inner]) - 1]]
+    return found
+
+
+def light_up_to_its_end(bright: float, at: Callable[[float], float]) -> tuple[float, float]:
+    """Integrate the throughput over a gap in which light ends.
+
+    Parameters
+    ----------
+    bright : float
+        Throughput at the bright bound.
+    at : callable
+        Throughput at a distance from this bound, as a part of the gap.
+
+    Returns
+    -------
+    near, far : float
+        Integrals over the gap, of length 1, of throughput times the part that the bright and the dark bound have by
+        linear interpolation.
+    """
+    # bisection finds the end, and places the more wavelengths the closer they are to it
+    places, values, dark = [0.0], [bright], 1.0
+    for _ in range(BISECTIONS):
+        place = 0.5 * (places[-1] + dark)
+        value = at(place)
+        if value > DARK_PART * bright:
+            places.append(place)
+            values.append(value)
+        else:
+            dark = place
+    places.append(0.5 * (places[-1] + dark))
+    values.append(values[-1])
+    part, light = np.array(places), np.array(values)
+    return float(np.trapezoid(light * (1.0 - part), part)), float(np.trapezoid(light * part, part))
+
+
+def over(values: Floats, carried: Floats) -> Floats:
+    """Divide by the weight of rays; 0 where it is 0."""
+    return np.divide(values, carried, out=np.zeros_like(values), where=carried > 0.0)
+
+
+def seen_light(shot: Shot) -> Floats:
+    """Return the weights of a shot's light in the channels, shape (L, 3), at `CURVE_NM`."""
+    return _seen_light(shot.light.spectrum, shot.colorspace)
+
+
+@lru_cache(maxsize=64)
+def _seen_light(spectrum: Spectrum, colorspace: Colorspace) -> Floats:
+    parts: Floats = band_parts(spectrum, CURVE_NM[len(CURVE_NM) // 2], colorspace, CURVE_NM)[:, 0]
+    return parts

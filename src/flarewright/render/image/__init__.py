@@ -1,0 +1,13 @@
+"""Pictures: canvases, layers, colour and display.
+
+Modules:
+
+- `canvas`: `Canvas`, `merge`, `to_layer`, `lit_window`: planes of flux at several resolutions
+- `compose`: `beauty`: the sum of layers
+- `shown_layer`: `ShownLayer`: a layer that can show itself in a notebook
+- `gamut`: `apply_gamut`, `compressed`: colours outside the primaries of a file
+- `photographic_exposure`: `photographic_stops`: exposure from shutter, f-number and ISO
+- `display`: `view`, `auto_exposure`: from linear light to 8-bit sRGB
+- `aces_view`: `aces_pixels`: the ACES view through opencolorio
+- `cache`: `Kept` (a cache by key) and `BufferPool` (arrays joined in one block)
+"""

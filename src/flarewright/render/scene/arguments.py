@@ -1,0 +1,111 @@
+"""Arguments of `render`: a project or a lens, with settings that correspond to the flags of the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from inspect import Parameter, signature
+from os import PathLike, fspath
+from typing import TYPE_CHECKING, Any, ParamSpec, TypedDict, TypeVar, Unpack
+
+from pydantic import ValidationError
+
+from ...errors import ProjectError
+from ...model import Lens, Project
+
+if TYPE_CHECKING:
+    from ...model import (  # fmt: skip
+        Art,
+        Camera,
+        Coating,
+        CoatingChoice,
+        Design,
+        Dirt,
+        Holdout,
+        Imperfection,
+        Iris,
+        Light,
+        Output,
+        Plate,
+        Quality,
+        Scatter,
+        Starburst,
+    )
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class Settings(TypedDict, total=False):
+    """The fields of a project except its lens; `coating` can also be a text of the command line."""
+
+    f_number: float | None
+    iris: Iris | None
+    coating: str | PathLike[str] | Coating | CoatingChoice | None
+    lights: Sequence[Light]
+    camera: Camera
+    quality: Quality
+    output: Output
+    dirt: Dirt
+    starburst: Starburst
+    zoom: str | float | None
+    filter: Plate | None
+    imperfection: Imperfection | None
+    scatter: Scatter | None
+    holdout: Holdout | None
+    art: Art
+    design: Design | None
+
+
+def project_of(given: Project | Lens | str | PathLike[str], **settings: Unpack[Settings]) -> Project:
+    """Return a project with some settings changed, or a new project for a lens.
+
+    Parameters
+    ----------
+    given : Project, Lens, str or path
+        A project; or a prescription, the name of a shipped lens, or a lens file, which gets a project of `settings`.
+    **settings : Settings
+        Fields of the project; they override those of `given`.
+
+    Returns
+    -------
+    Project
+
+    Raises
+    ------
+    ProjectError
+        A setting is invalid, or a lens is given without lights.
+    """
+    if isinstance(given, Project) and not settings:
+        return given
+    fields: dict[str, Any] = {**settings}
+    if isinstance(given, Project):
+        fields = {**{name: getattr(given, name) for name in Project.model_fields}, **fields}
+    else:
+        fields["lens"] = given if isinstance(given, Lens) else fspath(given)
+        if "lights" not in fields:
+            raise ProjectError("no light is given; say where it is: lights=[Light(field_deg=(10, 5))] (degrees)")
+    if "coating" in settings:
+        from ...io.lens.coating_text import coating_choice
+
+        fields["coating"] = coating_choice(settings["coating"])
+    try:
+        return Project.model_validate(fields)
+    except ValidationError as error:
+        from ...io.files.sentences import summary
+        from ...io.project.project_file import ProjectFileError, validation_messages
+
+        findings = validation_messages(error, fields)
+        raise ProjectFileError(summary("the project", findings), tuple(findings)) from None
+
+
+def naming_settings(function: Callable[P, R]) -> Callable[P, R]:
+    """Add the fields of `Settings` to a function's signature, for help texts and completion."""
+    plain = signature(function)
+    named = [one for one in plain.parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
+    named += [
+        Parameter(name, Parameter.KEYWORD_ONLY, default=..., annotation=annotation.__forward_arg__)
+        for name, annotation in Settings.__annotations__.items()
+    ]
+    # `inspect.signature` reads this attribute
+    function.__signature__ = plain.replace(parameters=named)  # type: ignore[attr-defined]
+    return function

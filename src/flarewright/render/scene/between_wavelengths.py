@@ -1,0 +1,85 @@
+"""The lens at more than the traced wavelengths, for ghosts whose throughput changes fast between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from ...model import Coating, Lens
+from ...model.project.light import Spectrum
+from ...optics.colour.spectrum import hats
+from ...optics.lens.paraxial import FirstOrder
+from ...optics.rays.pack import PackedLens, SensorMirror, pack_lens
+from ...optics.rays.path_reflectance import CURVE_NM, BandCurves, CoatingCurves, band_curves
+from ...typing import Floats
+
+# dense where films reflect most and glass disperses most
+FINE_NM = np.array([
+    365.0, 375.0, 385.0, 395.0, 405.0, 415.0, 427.5, 442.5, 460.0, 480.0, 500.0, 520.0, 540.0, 560.0, 580.0, 602.5,
+    630.0, 660.0, 690.0, 720.0, 755.0,
+])  # fmt: skip
+# of these, the two at which drafts compare the flux of all ghosts, towards the ends, where films reflect most (about
+# half of the light below 450 nm lies below the first); and what steep ghosts need besides, where films' reflectance
+# changes most
+BEYOND, STEEP = [2, 19], [5, 17, 20]
+# of these, the nearest to each wavelength of a curve
+NEAREST = np.abs(FINE_NM - CURVE_NM[:, None]).argmin(axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Between:
+    """A lens that can be packed at many wavelengths.
+
+    Attributes
+    ----------
+    lens : Lens
+    order : FirstOrder
+    coatings : tuple of Coating or None
+        One per row.
+    sensor : SensorMirror or None
+    curves : CoatingCurves or None
+    spectrum : Spectrum
+        Of the light.
+    """
+
+    lens: Lens
+    order: FirstOrder
+    coatings: tuple[Coating | None, ...]
+    sensor: SensorMirror | None
+    curves: CoatingCurves | None
+    spectrum: Spectrum
+
+    def packed_at(self, wavelengths_nm: Floats) -> tuple[PackedLens, BandCurves | None]:
+        """Pack the lens at some wavelengths, with the means over their bands."""
+        bands = None if self.curves is None else band_curves(self.curves, self.spectrum, tuple(wavelengths_nm.tolist()))
+        packed = pack_lens(
+            self.lens, self.order, self.coatings, wavelengths_nm, sensor=self.sensor,
+            in_bands=None if bands is None else bands.tables[:, : len(self.lens.rows)],
+        )  # fmt: skip
+        return packed, bands
+
+    @cached_property
+    def finer(self) -> tuple[PackedLens, BandCurves | None]:
+        """The lens at `FINE_NM`, and the bands of these wavelengths."""
+        return self.packed_at(FINE_NM)
+
+    @cached_property
+    def curve_indices(self) -> Floats:
+        """Indices of the gaps at `CURVE_NM`, shape (L, K + 1): almost linear in 1 / wavelength^2."""
+        return hats(-(CURVE_NM**-2.0), -(FINE_NM**-2.0)).T @ self.finer[0].n_gap
+
+
+# all frames of a sequence share one
+@lru_cache(maxsize=4)
+def lens_between(
+    lens: Lens,
+    order: FirstOrder,
+    coatings: tuple[Coating | None, ...],
+    sensor: SensorMirror | None,
+    curves: CoatingCurves | None,
+    spectrum: Spectrum,
+) -> Between:
+    """Return a cached `Between` for a lens."""
+    return Between(lens, order, coatings, sensor, curves, spectrum)

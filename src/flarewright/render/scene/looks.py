@@ -1,0 +1,167 @@
+"""Apply a look to a project with another lens and other lights, or extract the look of a project."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...errors import ProjectError
+from ...io.measurement.ghost_model_file import is_ghost_model_file
+from ...model import Art, Bare, Camera, Everywhere, InTurn, Iris, Light, Look, Preset, Project
+from ...model.project.look import CAMERA_KEYS, LIGHT_KEYS
+from ...model.project.project import AsLens, CoatingChoice
+from ...optics.rays.pack import preset_names, resolve_coatings, rows_in_air
+from .photographic_defaults import as_photographed
+from .resolve import open_lens
+
+
+def with_look(project: Project, look: Look) -> tuple[Project, tuple[str, ...]]:
+    """Apply a look to a project.
+
+    Parameters
+    ----------
+    project : Project
+        Its lens, the positions of its lights and all settings that the look does not contain stay.
+    look : Look
+
+    Returns
+    -------
+    project : Project
+        Lights with a size keep it. The f-number is at least that of the lens.
+    remarks : tuple of str
+        Parts of the look that do not fit this lens.
+
+    Raises
+    ------
+    FlarewrightError
+        A lens cannot be read.
+    """
+    changes: dict[str, Any] = {}
+    remarks: list[str] = []
+    same_lens = look.example.lens == project.lens
+    for key in look.says:
+        section = key.partition(".")[0]
+        if section == "coating":
+            changes["coating"] = look.example.coating if same_lens else _transferred_coating(look.example, project)
+        elif section == "f_number" and look.example.f_number is not None:
+            changes["f_number"] = max(look.example.f_number, open_lens(project.lens).lens.f_number)
+        elif section == "art":
+            art = look.example.art if same_lens else without_lens_rules(look.example.art)
+            if (lost := len(look.example.art.rules) - len(art.rules)) > 0:
+                remarks.append(f"{lost} of the look's rules name ghosts of {look.example.lens} and are left out")
+            changes["art"] = art
+        elif section == "iris":
+            own = project.iris or open_lens(project.lens).lens.iris
+            changes["iris"] = own.replace(**look.of("iris"))
+        elif section == "camera":
+            changes["camera"] = project.camera.replace(**look.of("camera"))
+        elif section == "lights":
+            changes["lights"] = tuple(_with_look_light(light, look) for light in project.lights)
+        else:
+            changes[section] = getattr(look.example, section)
+    found: Project = project.replace(**changes)
+    return found, tuple(remarks)
+
+
+def look_of(project: Project, name: str, notes: str = "") -> tuple[Look, tuple[str, ...]]:
+    """Extract the look of a project: its settings that differ from a bare lens with white point lights.
+
+    Parameters
+    ----------
+    project : Project
+        With a lens, not with a measured flare.
+    name, notes : str
+
+    Returns
+    -------
+    look : Look
+    remarks : tuple of str
+        Parts of the project that the look does not contain.
+
+    Raises
+    ------
+    FlarewrightError
+        The lens cannot be read, or no setting of the project belongs to a look.
+    """
+    if isinstance(project.lens, str) and is_ghost_model_file(project.lens):
+        raise ProjectError("a look cannot be taken from a measured flare; give a project with a lens")
+    lens = open_lens(project.lens).lens
+    plain = Project(lens=project.lens, lights=project.lights)
+    says = [
+        section
+        for section in ("f_number", "coating", "filter", "imperfection", "scatter", "dirt", "starburst", "art")
+        if getattr(project, section) != getattr(plain, section)
+    ]
+    iris = project.iris or lens.iris
+    says += [f"iris.{key}" for key in Iris.model_fields if getattr(iris, key) != getattr(lens.iris, key)]
+    says += [f"camera.{key}" for key in CAMERA_KEYS if getattr(project.camera, key) != getattr(Camera(), key)]
+    first = project.lights[0]
+    point = Light(field_deg=first.field_deg)
+    says += [f"lights.{key}" for key in LIGHT_KEYS if getattr(first, key) != getattr(point, key)]
+    if not says:
+        raise ProjectError(
+            "the project is a bare lens, wide open, with a white point of light: there is nothing in it for a look"
+        )
+    remarks = []
+    if any(getattr(light, key) != getattr(first, key) for light in project.lights for key in LIGHT_KEYS):
+        remarks.append("lights differ in colour or size: the look uses those of the first")
+    return Look(name=name, notes=notes, example=project, says=tuple(says)), tuple(remarks)
+
+
+def without_lens_rules(art: Art) -> Art:
+    """Return the art rules without those that name ghosts or rows of one lens."""
+    rules = tuple(rule for rule in art.rules if not any(letter.isdigit() for letter in _named(rule.select)))
+    found: Art = art.replace(rules=rules)
+    return found
+
+
+def _named(select: str) -> str:
+    """Return the part of a selector that can name ghosts of one lens; numbers of `brightest` and `largest` do not."""
+    return "" if "brightest:" in select or "largest:" in select else select
+
+
+def _with_look_light(light: Light, look: Look) -> Light:
+    """Give a light the look's spectrum, and the look's size if it has none."""
+    values = look.of("lights")
+    if light.diameter_deg > 0.0 or light.shape is not None:
+        values = {key: value for key, value in values.items() if key == "spectrum"}
+    changed: Light = light.replace(**values)
+    return changed
+
+
+def _transferred_coating(example: Project, project: Project) -> CoatingChoice:
+    """Return the example's coatings for another lens: `InTurn` if the example lists them by row."""
+    choice = example.coating
+    if isinstance(choice, Everywhere | InTurn | AsLens):
+        return choice
+    if isinstance(choice, Preset) and choice.name in preset_names(open_lens(project.lens).lens):
+        return choice
+    lens = open_lens(example.lens).lens
+    coatings = resolve_coatings(lens, choice)
+    return InTurn(coatings=tuple(coatings[k] or Bare() for k in rows_in_air(lens)))
+
+
+def demonstration(look: Look, size_px: tuple[int, int] | None = None) -> Project:
+    """Return a look with the lens and light of its example; all other settings are photographic defaults.
+
+    Parameters
+    ----------
+    look : Look
+    size_px : tuple of int, optional
+        Of the picture; None: the project's default.
+
+    Returns
+    -------
+    Project
+    """
+    example = Project(lens=look.example.lens, lights=look.example.lights, zoom=look.example.zoom)
+    project, _ = as_photographed(with_look(example, look)[0], look_keys(look))
+    if size_px is None:
+        return project
+    found: Project = project.replace(camera=project.camera.replace(size_px=size_px))
+    return found
+
+
+def look_keys(look: Look) -> frozenset[str]:
+    """Return the keys of a look as `render.scene.photographic_defaults.as_photographed` names them."""
+    sized = ("lights.diameter_deg", "lights.shape")
+    return frozenset("lights" if key in sized else key for key in look.says)

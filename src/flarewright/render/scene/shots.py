@@ -1,0 +1,105 @@
+"""Prepare all lights of a project as shots: area lights in parts, without what holdouts hide."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import ProjectError
+from ...model import Light, Project
+from ...optics.colour.spectrum import covers_all_lines, sampled_wavelengths, traced_wavelengths
+from ...optics.pupil.light_shape import parts
+from ...optics.pupil.polygon import closed
+from ...optics.rays.bundle import Incidence, incidence, least_distance
+from ...optics.rays.pack import PackedLens, facing, resolve_coatings
+from ...optics.rays.path_reflectance import BandCurves, coating_curves
+from .between_wavelengths import FINE_NM, Between, lens_between
+from .holdout import read_plates, seen_part
+from .opening import Opening
+from .resolve import ResolvedProject
+from .shot import Shot
+
+
+def make_shots(settled: ResolvedProject, opening: Opening, *, sampled: bool = False) -> tuple[Shot, ...]:
+    """Return the shots of all lights of a project, several for an area light.
+
+    Parameters
+    ----------
+    settled : ResolvedProject
+    opening : Opening
+    sampled : bool
+        Whether the wavelengths are spectral samples (`optics.colour.spectrum.sampled_wavelengths`), for random rays.
+
+    Returns
+    -------
+    tuple of Shot
+    """
+    project: Project = settled.project
+    width, height = project.camera.size_px
+    sensor = project.camera.sensor
+    to_pixels = np.array([width / 2.0, height / 2.0, width / sensor[0], height / sensor[1]])
+    coatings = resolve_coatings(settled.lens, settled.coating)
+    quality = project.quality
+    bridged = quality.bridge and quality.mode != "reference"
+    curves = coating_curves(settled.lens, coatings, settled.sensor) if bridged else None
+    choose = sampled_wavelengths if sampled else traced_wavelengths
+    packs: dict[tuple[object, ...], tuple[PackedLens, BandCurves | None, Between | None]] = {}
+    shots: list[Shot] = []
+    for number, light in enumerate(project.lights):
+        wavelengths_nm = choose(quality.wavelengths, light.spectrum)
+        # line spectra are traced at their lines
+        banded = curves is not None and not covers_all_lines(light.spectrum, wavelengths_nm)
+        traced = tuple(wavelengths_nm.tolist())
+        key = (traced, light.spectrum)
+        if key not in packs:
+            of_bands = curves if banded else None
+            between = lens_between(settled.lens, settled.order, coatings, settled.sensor, of_bands, light.spectrum)
+            steep = bridged and not covers_all_lines(light.spectrum, wavelengths_nm) and 1 < len(traced) < len(FINE_NM)
+            packs[key] = *between.packed_at(wavelengths_nm), between if steep else None
+        of_light, bands, between_them = packs[key]
+        whole = []
+        for part in parts(light, quality.source_step_deg):
+            changes = {"field_deg": part.field_deg, "intensity": light.intensity * part.share, "holdout": None}
+            point = light.replace(**changes, diameter_deg=0.0, shape=None) if light.extended else light
+            seen = _seen(settled, of_light, number, point)
+            packed = facing(of_light, seen.axes, seen.nearness)
+            whole.append(
+                Shot(
+                    point,
+                    seen,
+                    packed,
+                    opening,
+                    to_pixels,
+                    (width, height),
+                    project.output.colorspace,
+                    number=number,
+                    share=part.share,
+                    border=closed(part.corners) if light.extended else None,
+                    grating=project.camera.sensor_grating,
+                    curves=bands,
+                    between=between_them,
+                )
+            )
+        shots += whole if project.holdout is None and light.holdout is None else _unhidden(settled, light, whole)
+    return tuple(shots)
+
+
+def _unhidden(settled: ResolvedProject, light: Light, whole: list[Shot]) -> list[Shot]:
+    """Return the visible parts of a light, or one dark point if all of it is hidden."""
+    plates = read_plates(settled.project, light)
+    seen = [shot for part in whole if (shot := seen_part(settled.lens, part, plates)) is not None]
+    return seen or [replace(whole[0], light=whole[0].light.replace(intensity=0.0), share=0.0, border=None)]
+
+
+def _seen(settled: ResolvedProject, packed: PackedLens, number: int, light: Light) -> Incidence:
+    """Return a light's incidence; raise an error if the light is inside the lens."""
+    if light.distance is None:
+        return incidence(light.field_deg)
+    least = least_distance(packed)
+    if light.distance <= least:
+        raise ProjectError(
+            f"lights[{number}].distance: a light at {light.distance:g} mm stands in the lens {settled.lens.name} or "
+            f"behind its entrance pupil; give more than {least:.4g} mm"
+        )
+    return incidence(light.field_deg, light.distance, settled.order.entrance_pupil_z)

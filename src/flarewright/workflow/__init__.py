@@ -1,0 +1,53 @@
+"""Whole tasks as library calls: measure a camera, search lenses, predict flare, open all files of a project.
+
+The command line and other front ends call these functions; nothing here prints.
+
+- `measure_run`: `run_stages` runs the stages of a measurement in a run's folder (`StageResult`)
+- `measure_provenance`: `STAGES`; records from which model the file of a later stage was made
+- `lens_search`: `search_lenses` searches lenses for a project's targets and returns a `LensSearch`
+- `flare_curves`: `flare_curves` predicts a lens' flare over the constellation
+- `lens_flares`: `lens_flares`, `scene_flare` and `camera_project` build the flares that a prediction needs
+- `measured_flares`: `model_flares` builds them from a measured model
+- `measured_camera`: `model_in_scene` does so for a camera of a scene; `model_errors` finds its errors
+- `project_files`: `open_project_files` opens all files of a project and collects the errors
+- `scene_check`: `camera_errors` and `light_errors` find the errors of a scene
+- `long_jobs`: `JOBS` lists the commands that can run for more than a minute, and how each keeps its partial work
+- `defaults`: default sizes of predictions
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..lazy import lazy_names
+
+if TYPE_CHECKING:
+    from .flare_curves import flare_curves as flare_curves
+    from .lens_flares import camera_project as camera_project
+    from .lens_flares import lens_flares as lens_flares
+    from .lens_flares import scene_flare as scene_flare
+    from .lens_search import LensSearch as LensSearch
+    from .lens_search import search_lenses as search_lenses
+    from .measure_provenance import STAGES as STAGES
+    from .measure_run import StageResult as StageResult
+    from .measure_run import run_stages as run_stages
+    from .project_files import open_project_files as open_project_files
+
+__all__, __getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        ".flare_curves": ("flare_curves",),
+        ".lens_flares": (
+            "camera_project",
+            "lens_flares",
+            "scene_flare",
+        ),
+        ".lens_search": (
+            "LensSearch",
+            "search_lenses",
+        ),
+        ".measure_provenance": ("STAGES",),
+        ".measure_run": ("StageResult", "run_stages"),
+        ".project_files": ("open_project_files",),
+    },
+)

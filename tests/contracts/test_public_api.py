@@ -1,0 +1,29 @@
+"""The public names of `flarewright.measure`, `design`, `predict`, `workflow`: present, documented, cheap to import."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib import import_module
+
+import pytest
+
+PACKAGES = ["measure", "design", "predict", "workflow"]
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_every_public_name_is_present_and_documented(name):
+    package = import_module(f"flarewright.{name}")
+    assert package.__all__ == sorted(package.__all__)
+    assert len(package.__all__) >= 5
+    for each in package.__all__:
+        found = getattr(package, each)
+        assert found.__doc__ if callable(found) else found
+    assert set(package.__all__) <= set(dir(package))
+    with pytest.raises(AttributeError, match=f"module 'flarewright.{name}' has no attribute 'nothing'"):
+        package.nothing  # noqa: B018
+
+
+def test_packages_import_nothing_heavy():
+    code = f"import sys; [__import__('flarewright.' + each) for each in {PACKAGES}]; assert 'numpy' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,102 @@
+"""Direct changes: the ghost gets its new size, the stop its new place."""
+
+import numpy as np
+import pytest
+
+from flarewright.cli.app import run
+from flarewright.design.finishing.lens_edits import move_stop, resize_all, resize_ghost
+from flarewright.design.problem.ghosts import placed_ghosts
+from flarewright.errors import ProjectError
+from flarewright.io.lens.toml_lens import read_lens
+from flarewright.model import Stop
+from flarewright.optics.lens.paraxial import first_order
+from flarewright.render.scene.resolve import load_lens
+
+LENS = load_lens("heliar-tronnier")
+
+
+@pytest.mark.parametrize(("mirror", "row", "height"), [("first", 4, 1.1), ("second", 1, 1.3)])
+def test_a_ghost_gets_its_size_by_one_radius(mirror, row, height):
+    done = resize_ghost(LENS, (4, 1), height, mirror=mirror)
+    assert done.row == row
+    g = done.ghosts.index((4, 1))
+    assert abs(done.after[g, 1] / done.before[g, 1]) == pytest.approx(height, rel=1e-6)
+    changed = [k for k, (a, b) in enumerate(zip(LENS.rows, done.lens.rows, strict=True)) if a != b]
+    assert changed == [row]
+    # the written lens gives the same
+    entrance = 2.0 * LENS.rows[0].semi_diameter
+    now = placed_ghosts(done.lens, entrance=entrance)
+    assert np.allclose([[ghost.place, ghost.radius] for ghost in now], done.after, rtol=1e-9)
+    assert first_order(done.lens).stop_semi_diameter == pytest.approx(first_order(LENS).stop_semi_diameter)
+
+
+@pytest.mark.parametrize(("by", "height"), [("stop", 0.5), ("entrance", 0.3)])
+def test_one_opening_resizes_all_that_it_bounds(by, height):
+    """With a small stop, the stop bounds all ghosts; with a small front, the front bounds most of them."""
+    done = resize_all(LENS, height, by=by, f_number=11.0 if by == "stop" else None)
+    radii = np.abs(done.after[:, 1] / done.before[:, 1])
+    assert (radii <= 1.0 + 1e-12).all()
+    assert radii.min() >= height - 1e-12
+    assert np.isclose(radii, height).sum() >= (len(radii) if by == "stop" else 4)
+    # the written lens gives the same
+    now = placed_ghosts(done.lens)
+    assert np.allclose([[one.place, one.radius] for one in now], done.after, rtol=1e-9)
+    assert first_order(done.lens).efl == pytest.approx(first_order(LENS).efl)
+
+
+def test_the_stop_moves_and_keeps_its_size():
+    moved = move_stop(LENS, 3)
+    assert isinstance(moved.rows[3], Stop)
+    assert len(moved.rows) == len(LENS.rows) - 1
+    assert sum(row.thickness for row in moved.rows) == pytest.approx(sum(row.thickness for row in LENS.rows))
+    assert first_order(moved).stop_semi_diameter == pytest.approx(first_order(LENS).stop_semi_diameter)
+
+
+@pytest.mark.parametrize(
+    ("words", "reported"),
+    [
+        (["resize", "heliar-tronnier", "-o", "a.toml", "--ghost", "7-1", "--height", "2"], "no ghost 7-1"),
+        (["resize", "heliar-tronnier", "-o", "a.toml", "--ghost", "x", "--height", "2"], "write its mirrors"),
+        (["resize", "heliar-tronnier", "-o", "a.toml", "--ghost", "4-1", "--height", "0"], "no size"),
+        (["resize", "heliar-tronnier", "-o", "a.toml", "--ghost", "4-1", "--height", "2", "--mirror", "x"], "first or"),
+        (["resize", "heliar-tronnier", "-o", "a.exr", "--ghost", "4-1", "--height", "2"], "must be named"),
+        (["resize", "heliar-tronnier", "-o", "a.toml", "--height", "2"], "--ghost J-I for one"),
+        (["resize", "heliar-tronnier", "-o", "a.toml", "--all", "x", "--height", "2"], "stop or entrance"),
+        (["resize", "heliar-tronnier", "-o", "a.toml", "--all", "entrance", "--height", "9"], "wider than that"),
+        (["resize", "heliar-tronnier", "-o", "a.toml", "--all", "stop", "--height", "0.001"], "f-numbers go from"),
+        (
+            ["move-stop", "heliar-tronnier", "-o", "a.toml", "--row", "5"],
+            "row 5 is the stop already",
+        ),
+        (["move-stop", "heliar-tronnier", "-o", "a.toml", "--row", "1"], "glass is in front"),
+        (
+            ["move-stop", "heliar-tronnier", "-o", "a.toml", "--row", "99"],
+            "row 99 cannot become the stop: choose a surface between 0 and",
+        ),
+        (["move-stop", "nikon-28-75", "-o", "a.toml", "--row", "24"], "f-numbers go from 0.3 to 256"),
+        (
+            ["resize", "heliar-tronnier", "-o", "a.toml", "--ghost", "8-6", "--height", "0.2", "--fstop", "200"],
+            "f-numbers go from 0.3 to 256",
+        ),
+    ],
+)
+def test_errors_are_reported(words, reported, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(["design", *words]) == 2
+    assert reported in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_commands_write_lenses(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(["design", "resize", "heliar-tronnier", "-o", "a.toml", "--ghost", "4-1", "--height", "1.1"]) == 0
+    assert "1.100" in capsys.readouterr().out
+    assert run(["design", "move-stop", "heliar-tronnier", "-o", "b.toml", "--row", "3"]) == 0
+    assert "the stop is row 3" in capsys.readouterr().out
+    for name in ("a.toml", "b.toml"):
+        assert read_lens(tmp_path / name)[0].rows
+
+
+def test_a_size_that_no_radius_gives_is_refused():
+    with pytest.raises(ProjectError, match="no curvature of row"):
+        resize_ghost(LENS, (2, 1), 1e6)

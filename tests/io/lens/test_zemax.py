@@ -1,0 +1,287 @@
+"""The `.zmx` importer: correct lenses, or an error with the reason."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from flarewright.cli.app import app
+from flarewright.errors import LensError
+from flarewright.io.lens.toml_lens import read_lens
+from flarewright.io.lens.zemax import decoded
+from flarewright.model import Stop, Surface
+from flarewright.optics.lens.paraxial import first_order
+from flarewright.optics.lens.surface_shape import sag
+from flarewright.render.scene.resolve import load_lens
+
+HEAD = """\
+VERS 140124 258 36214
+MODE SEQ
+NAME {name}
+NOTE 0 made up for a test
+UNIT {unit} X W X CM MR CPMM
+{opening}
+FTYP 0 0 2 3 0 0 0
+XFLN 0 0 0 0
+YFLN 0 {field} 0 0
+WAVM 1 0.5876 1
+SURF 0
+  TYPE STANDARD
+  CURV 0.0 0 0 0 0 ""
+  DISZ INFINITY
+  DIAM 0 0 0 0 1 ""
+"""
+
+
+def surface(number, curvature=0.0, gap=0.0, glass="", rim="5 1", kind="STANDARD", more=()):
+    lines = [f"SURF {number}", *(["  STOP"] if "STOP" in more else []), f"  TYPE {kind}"]
+    lines += [
+        f'  CURV {curvature:.17E} 0 0 0 0 ""',
+        *(f"  {line}" for line in more if line != "STOP"),
+        f"  DISZ {gap!r}",
+    ]
+    if glass:
+        lines.append(f"  GLAS {glass}")
+    return "\n".join([*lines, f'  DIAM {rim} 0 0 1 ""', ""])
+
+
+def text_of(*surfaces, name="Two lenses", unit="MM", opening="FNUM 4 0", field=10.0, tail="MNUM 1 1\n"):
+    head = HEAD.format(name=name, unit=unit, opening=opening, field=field)
+    return head + "".join(surfaces) + tail
+
+
+def doublet(gap=96.5, **more):
+    """Return a lens of two glasses with an iris between them."""
+    return text_of(
+        surface(1, 1 / 61.47, 6.0, "N-BK7 0 0 1.5 4.0E+1 0 0 0 0 0 0", "12.5 1"),
+        surface(2, -1 / 44.64, 2.5, "SF5 0 0 1.5 4.0E+1 0 0 0 0 0 0", "12.5 1"),
+        surface(3, -1 / 129.94, 3.0, rim="12.5 1"),
+        surface(4, 0.0, 2.0, rim="9 0", more=["STOP"]),
+        surface(5, 0.0, 1.5, "___BLANK 1 0 1.6 40.0 0 0 0 0 0 0", "12.5 0"),
+        surface(6, 0.0, gap, rim="12.5 0"),
+        surface(7),
+        **more,
+    )
+
+
+def write(tmp_path, text, name="lens.zmx", encoding="utf-8"):
+    path = tmp_path / name
+    path.write_bytes(text.replace("\n", "\r\n").encode(encoding))
+    return path
+
+
+def loaded(path):
+    remarks: list[str] = []
+    return load_lens(path, remarks=remarks), remarks
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252"])
+def test_every_encoding_gives_the_same_lens(tmp_path, encoding):
+    lens, _ = loaded(write(tmp_path, doublet(name="Ø 25 mm"), encoding=encoding))
+    assert lens.name == "Ø 25 mm"
+    assert [type(row) for row in lens.rows] == [Surface, Surface, Surface, Stop, Surface, Surface]
+    assert lens.rows[0].curvature == pytest.approx(1 / 61.47, rel=1e-15)
+    assert lens.rows[0].medium.n_d == pytest.approx(1.5168, abs=1e-5)
+    assert lens.rows[4].medium.n_d == 1.6
+    assert [row.thickness for row in lens.rows] == [6.0, 2.5, 3.0, 2.0, 1.5, 96.5]
+    assert lens.rows[1].semi_diameter == 12.5
+    assert lens.f_number == 4.0
+    assert lens.field_deg == 10.0
+
+
+def test_what_was_noticed_is_told(tmp_path):
+    _, remarks = loaded(write(tmp_path, doublet(gap=80.0)))
+    reported = " | ".join(remarks)
+    assert "the rims of surfaces 5, 6 just pass the file's own fields" in reported
+    assert "the file's image lies 80.00 mm behind the last surface" in reported
+
+
+def test_the_opening_follows_from_whatever_the_file_gives(tmp_path):
+    lens, _ = loaded(write(tmp_path, doublet()))
+    efl = first_order(lens).efl
+    # thin lenses in contact: the power is the sum within the effect of their thickness
+    powers = 0.5168 * (1 / 61.47 + 1 / 44.64) + 0.67270 * (-1 / 44.64 + 1 / 129.94)
+    assert efl == pytest.approx(1 / powers, rel=0.02)
+    by_pupil, _ = loaded(write(tmp_path, doublet(opening="ENPD 20")))
+    assert by_pupil.f_number == pytest.approx(efl / 20.0, rel=1e-12)
+    by_stop, remarks = loaded(write(tmp_path, doublet(opening="FLOA 0")))
+    assert first_order(by_stop).stop_semi_diameter == pytest.approx(9.0, rel=1e-9)
+    assert any("the stop's semi-diameter of 9 mm gives" in remark for remark in remarks)
+
+
+def test_inches_become_millimetres(tmp_path):
+    aspheric = ["PARM 1 0", "PARM 2 -1.5E-2", "PARM 3 3.0E-3", "CONI -0.5"]
+    text = text_of(
+        surface(1, 0.4, 0.25, "N-BK7 0 0 1.5 40 0 0 0", "0.5 1", "EVENASPH", aspheric),
+        surface(2, 0.0, 0.2, rim="0.5 1"), surface(3, 0.0, 4.0, rim="0.4 1", more=["STOP"]), surface(4),
+        unit="IN",
+    )  # fmt: skip
+    lens, remarks = loaded(write(tmp_path, text))
+    assert any("converted to mm" in remark for remark in remarks)
+    assert lens.rows[0].thickness == pytest.approx(6.35)
+    assert lens.rows[0].semi_diameter == pytest.approx(12.7)
+    r = np.array([0.1, 0.3, 0.5])
+    wanted = 0.4 * r**2 / (1 + np.sqrt(1 - 0.5 * 0.16 * r**2)) - 1.5e-2 * r**4 + 3.0e-3 * r**6
+    np.testing.assert_allclose(sag(lens.rows[0], np.zeros(3), 25.4 * r), 25.4 * wanted, rtol=1e-12)
+
+
+def test_aspheres_of_other_kinds(tmp_path):
+    parabola = surface(1, 0.0, 4.0, "N-BK7 0 0 1.5 40", "6 1", "EVENASPH", ["PARM 1 0.02"])
+    scaled = surface(
+        2, -0.01, 2.0, "", "6 1", "XASPHERE", ["XDAT 1 2 0 0", "XDAT 2 10.0 0 0", "XDAT 3 0", "XDAT 4 0.25"]
+    )
+    oval = surface(4, 0.02, 3.0, "N-BK7 0 0 1.5 40", "6 1", "BICONICX", ["PARM 1 25.0", "PARM 2 -1.0"])
+    text = text_of(parabola, scaled, surface(3, 0.0, 2.0, more=["STOP"]), oval, surface(5, 0.0, 20.0), surface(6))
+    rows = loaded(write(tmp_path, text))[0].rows
+    r = np.array([1.0, 3.0, 5.0])
+    zero = np.zeros(3)
+    np.testing.assert_allclose(sag(rows[0], zero, r), 0.02 * r**2, rtol=1e-12)
+    assert rows[1].asphere == pytest.approx((0.25 / 10.0**4,))
+    x_sag = sag(rows[3], r, zero)
+    np.testing.assert_allclose(x_sag, r**2 / 50.0, rtol=1e-12)
+
+
+def test_a_rim_beyond_its_own_sphere_is_left_out_and_told(tmp_path):
+    path = tmp_path / "wide.zmx"
+    path.write_text(doublet().replace("DIAM 12.5 1", "DIAM 50.5 1", 2), "utf-16")
+    remarks = []
+    lens = load_lens(path, remarks=remarks)
+    rims = [row.semi_diameter for row in lens.rows if isinstance(row, Surface)]
+    assert rims[0] == 50.5
+    assert rims[1] < 1 / abs(lens.rows[1].curvature)
+    assert any("row 1: a rim of 50.5 mm does not fit a surface that ends 44.64 mm" in reported for reported in remarks)
+
+
+def test_a_stop_on_glass_gets_a_plane_of_its_own(tmp_path):
+    front = text_of(surface(1, 0.02, 5.0, "N-BK7 0 0 1.5 40", more=["STOP"]), surface(2, 0.0, 90.0), surface(3))
+    lens, remarks = loaded(write(tmp_path, front))
+    assert isinstance(lens.rows[0], Stop)
+    assert lens.rows[0].thickness == 0.0
+    assert "surface 1 is the stop and refracts: the stop is placed in front of it" in remarks
+    back = text_of(surface(1, 0.02, 5.0, "N-BK7 0 0 1.5 40"), surface(2, 0.0, 90.0, more=["STOP"]), surface(3))
+    lens, remarks = loaded(write(tmp_path, back))
+    assert isinstance(lens.rows[2], Stop)
+    assert (lens.rows[1].thickness, lens.rows[2].thickness) == (0.0, 90.0)
+    inside = text_of(
+        surface(1, 0.02, 5.0, "N-BK7 0 0 1.5 40"), surface(2, 0.01, 2.0, "SF5 0 0 1.5 40", more=["STOP"]),
+        surface(3, 0.0, 90.0), surface(4),
+    )  # fmt: skip
+    with pytest.raises(LensError, match="surface 2: the stop stands inside glass"):
+        load_lens(write(tmp_path, inside))
+
+
+def test_idle_planes_are_left_out(tmp_path):
+    text = text_of(
+        surface(1, 0.0, 10.0, rim="20 0"), surface(2, 0.02, 5.0, "N-BK7 0 0 1.5 40"), surface(3, 0.0, 1.0),
+        surface(4, 0.0, 2.0, kind="COORDBRK", more=["PARM 3 0"]), surface(5, 0.0, 3.0, more=["STOP"]),
+        surface(6, 0.0, 85.0), surface(7),
+    )  # fmt: skip
+    lens, remarks = loaded(write(tmp_path, text))
+    assert [row.thickness for row in lens.rows] == [5.0, 3.0, 88.0]
+    assert any(remark.startswith("surfaces 1, 4, 6: the same medium on both sides") for remark in remarks)
+
+
+def test_an_idle_coordinate_break_in_glass_divides_no_glass(tmp_path):
+    broken = text_of(
+        surface(1, 0.02, 3.0, "N-BK7 0 0 1.5 40"), surface(2, 0.0, 2.0, kind="COORDBRK", more=["PARM 3 0", "PARM 6 1"]),
+        surface(3, 0.0, 3.0), surface(4, 0.0, 85.0, more=["STOP"]), surface(5),
+    )  # fmt: skip
+    lens, remarks = loaded(write(tmp_path, broken))
+    assert [row.thickness for row in lens.rows] == [5.0, 3.0, 85.0]
+    assert any(remark.startswith("surface 2: the same medium on both sides") for remark in remarks)
+
+
+REFUSED = [
+    ("mirror", surface(1, 0.01, 5.0, "MIRROR 0 0 1.5 40"), "surface 1 is a mirror"),
+    ("tilt", surface(1, 0.0, 0.0, kind="COORDBRK", more=["PARM 3 -3.5"]), r"surface 1 tilts or shifts what follows"),
+    ("type", surface(1, 0.01, 5.0, kind="BINARY_2"), "surface 1 is of type BINARY_2; known are STANDARD"),
+    ("glass", surface(1, 0.01, 5.0, "C79-80 0 0 0 0"), "the glass C79-80 is in no catalogue and has no index"),
+    ("placeholder", surface(1, 0.01, 5.0, "UNOBTAINIUM 0 0 1.5 40"), "UNOBTAINIUM is in no catalogue and has no index"),
+    ("number", surface(1, 0.01, 5.0).replace("DISZ 5.0", "DISZ five"), "surface 1: DISZ is 'five'"),
+    ("square", surface(1, 0.01, 5.0, kind="EVENASPH", more=["PARM 1 0.1"]), "a term of r\\^2 beside its curvature"),
+]
+
+
+@pytest.mark.parametrize(("first", "reason"), [each[1:] for each in REFUSED], ids=[each[0] for each in REFUSED])
+def test_what_cannot_be_traced_is_refused(tmp_path, first, reason):
+    rest = [surface(2, 0.02, 5.0, "N-BK7 0 0 1.5 40"), surface(3, 0.0, 80.0, more=["STOP"]), surface(4)]
+    with pytest.raises(LensError, match=reason):
+        load_lens(write(tmp_path, text_of(first, *rest)))
+
+
+def test_what_is_no_lens_is_refused(tmp_path):
+    glass = surface(1, 0.02, 5.0, "N-BK7 0 0 1.5 40")
+    for text, reason in [
+        ("# nothing of use\n", "is it a .zmx file"),
+        (doublet().replace("MODE SEQ", "MODE NSC"), "not sequential"),
+        (doublet(unit="FURLONG"), "UNIT FURLONG is unknown"),
+        (text_of(glass, surface(2, 0.0, 80.0), surface(3)), "0 surfaces are the stop"),
+        (text_of(surface(1, 0.0, 2.0, more=["STOP"]), surface(2, 0.01, 80.0), surface(3)), "no surface refracts"),
+        (text_of(surface(1, 0, 1.0, more=["STOP"]), glass.replace("SURF 1", "SURF 2"), surface(3)), "inside glass"),
+        (doublet(opening="ENPD 1e4"), "out of range for a lens"),
+    ]:
+        with pytest.raises(LensError, match=reason):
+            load_lens(write(tmp_path, text))
+
+
+def test_a_near_object_is_where_the_lens_is_focused(tmp_path):
+    lens, remarks = loaded(write(tmp_path, doublet().replace("DISZ INFINITY", "DISZ 500")))
+    assert lens.focus_distance == 500.0
+    assert any("focused there" in remark for remark in remarks)
+
+
+def test_a_shipped_lens_comes_back(tmp_path):
+    """All numbers of the Heliar, written as such a file by this test and read back."""
+    lens = load_lens("heliar-tronnier")
+    blocks = []
+    for number, row in enumerate(lens.rows, start=1):
+        if isinstance(row, Stop):
+            blocks.append(surface(number, 0.0, row.thickness, more=["STOP"]))
+            continue
+        glass = "" if row.medium is None else f"___BLANK 1 0 {row.medium.n_d!r} {row.medium.v_d!r}"
+        blocks.append(surface(number, row.curvature, row.thickness, glass, f"{row.semi_diameter!r} 1"))
+    blocks.append(surface(len(lens.rows) + 1))
+    text = text_of(*blocks, opening=f"FNUM {lens.f_number!r} 0")
+    back, _ = loaded(write(tmp_path, text, encoding="utf-16"))
+    wanted, found = first_order(lens), first_order(back)
+    assert found.efl == pytest.approx(wanted.efl, rel=1e-9)
+    assert found.stop_semi_diameter == pytest.approx(wanted.stop_semi_diameter, rel=1e-9)
+    for mine, theirs in zip(back.rows, lens.rows, strict=True):
+        assert mine.thickness == theirs.thickness
+        if isinstance(theirs, Surface):
+            assert mine.curvature == pytest.approx(theirs.curvature, rel=1e-15)
+            assert mine.semi_diameter == theirs.semi_diameter
+
+
+def test_check_and_convert_take_such_files(tmp_path):
+    good = write(tmp_path, doublet(gap=80.0))
+    bad = write(tmp_path, doublet().replace("SF5 0 0", "MIRROR 0 0"), "bad.zmx")
+    runner = CliRunner()
+    checked = runner.invoke(app, ["lens", "check", str(good), str(bad)])
+    assert checked.exit_code == 2
+    assert "lens.zmx: usable, Two lenses" in checked.output
+    assert "from the paraxial focus" in checked.output
+    assert "surface 2 is a mirror" in checked.output
+    out = tmp_path / "own.toml"
+    converted = runner.invoke(app, ["lens", "convert", str(good), str(out)])
+    assert converted.exit_code == 0
+    lens = read_lens(out).lens
+    assert lens.f_number == 4.0
+    assert "Imported from lens.zmx." in lens.notes
+    assert first_order(lens).efl == pytest.approx(first_order(load_lens(good)).efl)
+
+
+def test_bytes_that_are_no_text_do_not_break_it():
+    assert decoded(b"\xff\xfeV\x00E\x00") == "VE"
+    assert decoded(b"NAME \xd8") == "NAME Ø"
+
+
+@pytest.mark.parametrize(("unit", "mm"), [("MM", 1.0), ("CM", 10.0), ("IN", 25.4)])
+def test_a_field_given_as_a_height_is_in_the_unit_of_the_file(unit, mm, tmp_path):
+    """FTYP 2 gives the height of the image, here half the focal length: atan(1/2) from the axis."""
+    order = first_order(load_lens(write(tmp_path, doublet(), "plain.zmx")))
+    text = doublet(unit=unit, field=0.5 * order.efl).replace("FTYP 0", "FTYP 2")
+    lens = load_lens(write(tmp_path, text))
+    assert first_order(lens).efl == pytest.approx(mm * order.efl, rel=1e-6)
+    assert lens.field_deg == pytest.approx(np.degrees(np.arctan(0.5)), rel=1e-3)

@@ -1,0 +1,75 @@
+"""Throughput between and beyond the traced wavelengths: against rays that are traced there; ends of a path's light."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flarewright.kernels.tracing.representative_rays import passing_area
+from flarewright.model import Camera, Light, Project, Quality
+from flarewright.optics.lens.paths import ghost_paths
+from flarewright.optics.rays.bundle import Refinement, trace_bundle, trace_grid
+from flarewright.optics.rays.path_reflectance import CURVE_NM
+from flarewright.render.ghosts.steep_ghosts import _areas_between, abrupt_ends, light_up_to_its_end, near_ends
+from flarewright.render.ghosts.traced_ghosts import find_final
+from flarewright.render.scene.between_wavelengths import FINE_NM
+from flarewright.render.scene.opening import make_opening
+from flarewright.render.scene.path_color import visible_rays
+from flarewright.render.scene.resolve import resolve_project
+from flarewright.render.scene.shot import at_fine_wavelengths
+from flarewright.render.scene.shots import make_shots
+
+
+@pytest.mark.parametrize("name", ["13-0", "4-1", "8-7"])
+def test_interpolated_rays_pass_where_traced_ones_do(name):
+    project = Project(
+        lens="takumar-50-f1.4", f_number=4.0, lights=(Light(field_deg=(-9.0, 5.0)),), camera=Camera(size_px=(96, 54)),
+        quality=Quality(mode="final", wavelengths=7),
+    )  # fmt: skip
+    settled = resolve_project(project)
+    (shot,) = make_shots(settled, make_opening(settled, None))
+    (path,) = (path for path in ghost_paths(settled.lens) if path.name == name)
+    item, opening, tilt = find_final(shot, path), shot.opening, shot.incidence.tilt
+    detail = Refinement(float(shot.to_pixels[2]), view_radius=item.view_radius)
+    bundle = trace_grid(shot.packed, path, tilt, (opening.radius, opening.inner), item.region, detail)
+    fine, seen = at_fine_wavelengths(shot).packed, visible_rays(shot, item.to_pixels)
+    alone = replace(bundle, traced={})
+    traced = [
+        passing_area(bundle.pupil, bundle.triangles, seen(trace_bundle(fine, w, alone, tilt)))
+        for w in range(len(FINE_NM))
+    ]
+    found = _areas_between(shot, bundle, FINE_NM, item.to_pixels)
+    # of the three, one falls to a third of its first value, one to a sixth
+    assert np.abs(found - traced).max() < 0.05 * max(traced)
+    assert max(traced) > 1.15 * min(traced)
+
+
+def test_wavelengths_are_added_where_light_ends():
+    nm = np.array([400.0, 420.0, 440.0, 460.0, 480.0, 500.0])
+    throughput = np.array([
+        [1.0, 0.9, 0.8, 0.7, 0.6, 0.5],
+        [0.0, 0.0, 0.0, 0.6, 0.8, 1.0],
+        [0.3, 0.2, 0.1, 0.02, 0.0, 0.0],
+    ])  # fmt: skip
+    rises, falls = abrupt_ends(throughput)
+    assert np.argwhere(rises).tolist() == [[1, 2]]
+    assert not falls.any()
+    # the gap that holds the end, and the next on its bright side
+    within = np.arange(442.5, 480.0, 2.5)
+    assert CURVE_NM[near_ends(nm, rises, falls)].tolist() == within[within != 460.0].tolist()
+    rises, falls = abrupt_ends(throughput[:, ::-1])
+    within = np.arange(422.5, 460.0, 2.5)
+    assert CURVE_NM[near_ends(nm, rises, falls)].tolist() == within[within != 440.0].tolist()
+
+
+@pytest.mark.parametrize("end", [0.03, 0.4, 0.97])
+@pytest.mark.parametrize("power", [0.0, 0.5])
+def test_the_light_of_a_gap_is_integrated_up_to_its_end(end, power):
+    """A constant, and a square root as near total reflection: moments in closed form."""
+    near, far = light_up_to_its_end(end**power, lambda part: (end - part) ** power if part < end else 0.0)
+    whole = end ** (power + 1.0) / (power + 1.0)
+    moment = end ** (power + 2.0) / ((power + 1.0) * (power + 2.0))
+    assert near + far == pytest.approx(whole, abs=0.02)
+    assert far == pytest.approx(moment, abs=0.02)

@@ -1,0 +1,79 @@
+"""Run the rig: `python -m tests.trust --minutes N [KIND...]`.
+
+Each kind of hostile input runs in turn in a worker process, with the next seed each time. The rig reports every input
+on which a promise was broken, and a table of all. It exits with 1 if one was broken.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+
+from .kinds import KINDS
+from .worker import Tried, Worker
+
+
+def rig(kinds: list[str], minutes: float, seed: int, report: Callable[[str], None]) -> list[tuple[str, Tried]]:
+    """Run kinds in turn until the time is over; report broken promises at once.
+
+    Parameters
+    ----------
+    kinds : list of str
+        Keys of `KINDS`.
+    minutes : float
+    seed : int
+        The first seed of every kind.
+    report : callable
+        Receives a line for each broken promise.
+
+    Returns
+    -------
+    list of (str, Tried)
+    """
+    end, worker, done = time.monotonic() + 60.0 * minutes, Worker(), []
+    spent = dict.fromkeys(kinds, 0.0)
+    number = dict.fromkeys(kinds, seed)
+    while time.monotonic() < end:
+        # the kind with the least time so far: slow kinds do not crowd out quick ones
+        kind = min(kinds, key=lambda each: spent[each])
+        start = time.monotonic()
+        tried = worker.run(kind, number[kind])
+        done.append((kind, tried))
+        if not tried.verdict.held:
+            report(f"BROKEN {kind}, seed {number[kind]}: {tried.verdict.subject}: {tried.verdict.remark}")
+        number[kind] += 1
+        spent[kind] += time.monotonic() - start
+    worker.stop()
+    return done
+
+
+def table(done: list[tuple[str, Tried]]) -> str:
+    """Return one line per kind: inputs, broken promises, longest time, largest memory."""
+    lines = [f"{'kind':16} {'inputs':>7} {'broken':>7} {'longest':>10} {'memory':>10}"]
+    for kind in dict.fromkeys(kind for kind, _ in done):
+        of = [tried for each, tried in done if each == kind]
+        broken = sum(not tried.verdict.held for tried in of)
+        longest, peak = max(tried.cpu_s for tried in of), max(tried.peak_mb for tried in of)
+        lines.append(f"{kind:16} {len(of):7} {broken:7} {longest:6.1f} CPU s {peak:6.0f} MB")
+    return "\n".join(lines)
+
+
+def main() -> int:
+    """Parse the arguments, run the rig and print the table."""
+    parser = argparse.ArgumentParser(prog="python -m tests.trust", description=__doc__)
+    parser.add_argument("kinds", nargs="*", help=f"kinds of input (default: all): {', '.join(KINDS)}")
+    parser.add_argument("--minutes", type=float, default=1.0)
+    parser.add_argument("--seed", type=int, default=0, help="first seed of every kind (default: 0)")
+    given = parser.parse_args()
+    unknown = set(given.kinds) - set(KINDS)
+    if unknown:
+        parser.error(f"no kind {', '.join(sorted(unknown))}; choose from {', '.join(KINDS)}")
+    done = rig(given.kinds or list(KINDS), given.minutes, given.seed, lambda line: print(line, flush=True))
+    print(table(done))
+    return 1 if any(not tried.verdict.held for _, tried in done) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

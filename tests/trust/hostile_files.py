@@ -1,0 +1,201 @@
+"""Damaged files for every reader: valid small files with bytes and words changed."""
+
+from __future__ import annotations
+
+import random
+import shutil
+import tempfile
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import tifffile
+from PIL import Image
+
+from .answers import judged
+from .commands import ARGUMENTS
+from .hostile_flags import NUMBERS, prepared
+from .verdict import Verdict
+
+RENDER = ("render", *ARGUMENTS["render"])
+BARE = ("render", "--project", "shot.toml", "--size", "32x18", "--quality", "draft", "-o", "out.exr")
+REPLAY = ("measure", "replay", *ARGUMENTS["measure replay"])
+
+READERS: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("lens.toml", ("lens", "check", "lens.toml", "--json")),
+    ("lens.lens", ("lens", "check", "lens.lens", "--json")),
+    ("lens.zmx", ("lens", "check", "lens.zmx", "--json")),
+    ("shot.toml", BARE),
+    ("shot.toml", ("project", "check", "shot.toml")),
+    ("shot.toml", ("design", "solve", "shot.toml", "-o", "found", "--time", "0.1")),
+    ("match.toml", ("scene", "check", "match.toml")),
+    ("warm.toml", ("looks", "save", "warm.toml", "-o", "new.toml")),
+    ("look.toml", (*RENDER, "--look", "look.toml")),
+    ("spectrum.csv", (*RENDER, "--spectrum", "spectrum.csv")),
+    ("iris.png", (*RENDER, "--iris-image", "iris.png")),
+    ("dirt.png", (*RENDER, "--dirt-image", "dirt.png")),
+    ("matte.png", (*RENDER, "--holdout", "matte.png")),
+    ("flare.exr", (*RENDER, "--depth", "flare.exr")),
+    ("flare.exr", ("design", "target", *ARGUMENTS["design target"])),
+    ("photo.npy", ("design", "target", "photo.npy", "--light", "5,3", "--focal", "50", "-o", "target.toml")),
+    ("photo.tiff", ("design", "target", "photo.tiff", "--light", "5,3", "--focal", "50", "-o", "target.toml")),
+    ("photo.jpg", ("design", "target", "photo.jpg", "--light", "5,3", "--focal", "50", "-o", "target.toml")),
+    ("searched/search.json", ("design", "resume", "searched", "--time", "0.1")),
+    ("model.json", REPLAY),
+    ("model.json", ("predict", "model.json", "--samples", "5", "--json")),
+    ("place.json", (*REPLAY[:3], *REPLAY[5:], "--camera", "place.json")),
+    ("captures.csv", ("measure", "merge", *ARGUMENTS["measure merge"])),
+    ("camera.json", ("measure", "merge", *ARGUMENTS["measure merge"])),
+    ("10.npy", ("measure", "merge", *ARGUMENTS["measure merge"])),
+    ("merged/merged.json", ("measure", "find", "merged")),
+)
+"""A file and the command that reads it; the files of `hostile_flags.prepare` and those of `_more`."""
+
+DOTLENS = """\
+# A plano-convex lens 100mm f/5
+focal_length: 100.0
+surfaces:
+  stop     2.00   1.00000  0.00    10.000   0
+  0        4.00   1.50000  60.00   12.000   1
+  -50.0    100.0  1.00000  0.00    12.000   0
+"""
+LOOK = """\
+schema_version = 1
+name = "Test"
+lens = "tessar-brendel"
+[iris]
+blades = 5
+[[lights]]
+field_deg = [5.0, 3.0]
+"""
+ZEMAX = """\
+NAME A plano-convex lens
+UNIT MM
+ENPD 20
+WAVM 1 0.5876 1
+SURF 0
+  DISZ INFINITY
+SURF 1
+  STOP
+  CURV 0
+  DISZ 2
+SURF 2
+  TYPE STANDARD
+  CURV 0
+  DISZ 4
+  GLAS ___BLANK 1 0 1.5 60
+  DIAM 12
+SURF 3
+  TYPE STANDARD
+  CURV -0.02
+  DISZ 100
+  DIAM 12
+SURF 4
+  DISZ 0
+"""
+
+WORDS = (
+    *NUMBERS[:20],
+    "[",
+    "]",
+    "{",
+    "}",
+    '"',
+    "'",
+    "[[[[[[[[",
+    "null",
+    "true",
+    "-",
+    "\n",
+    "\x00",
+    "\ufeff",
+    "=",
+    "é",
+    "1979-05-27",
+)
+
+
+@cache
+def _folder() -> Path:
+    """Return the prepared folder with a file for every reader."""
+    folder = prepared()
+    _more(folder)
+    return folder
+
+
+def prepared_files(folder: Path) -> Path:
+    """Copy the files of all readers to a new folder, and return it."""
+    shutil.copytree(_folder(), folder)
+    return folder
+
+
+def _more(folder: Path) -> None:
+    """Write the files that only readers need."""
+    (folder / "lens.lens").write_text(DOTLENS, "utf-8")
+    (folder / "lens.zmx").write_text(ZEMAX, "utf-8")
+    (folder / "look.toml").write_text(LOOK, "utf-8")
+    (folder / "spectrum.csv").write_text("400,1\n500,2\n600,1.5\n700,1\n", "utf-8")
+    y, x = np.mgrid[:24, :24] - 11.5
+    disc = Image.fromarray((255 * (np.hypot(x, y) < 9)).astype(np.uint8))
+    disc.save(folder / "iris.png")
+    disc.save(folder / "dirt.png")
+    disc.resize((32, 18)).save(folder / "matte.png")
+    photo = np.exp(-0.5 * (np.mgrid[:54, :96][1] - 50) ** 2 / 9.0)[..., None].repeat(3, axis=2).astype(np.float32)
+    np.save(folder / "photo.npy", photo)
+    eight = Image.fromarray((255 * photo).astype(np.uint8))
+    tifffile.imwrite(folder / "photo.tiff", (65535 * photo).astype(np.uint16))
+    eight.save(folder / "photo.jpg")
+    (folder / "place.json").write_text('{"light": [0.2, 0.1, -1.0], "size_px": [32, 18]}', "utf-8")
+
+
+def damaged(data: bytes, random_: random.Random) -> bytes:
+    """Return the bytes with one to four changes."""
+    out = bytearray(data)
+    for _ in range(random_.randint(1, 4)):
+        at = random_.randrange(len(out) + 1) if out else 0
+        match random_.randrange(8):
+            case 0:
+                out[at : at + 1] = bytes([random_.randrange(256)])
+            case 1:
+                del out[at : at + random_.randint(1, 64)]
+            case 2:
+                out[at:at] = random_.choice(WORDS).encode()
+            case 3:
+                part = bytes(out[at : at + random_.randint(1, 200)])
+                out[at:at] = part * random_.choice((1, 2, 50))
+            case 4:
+                del out[at:]
+            case 5 | 6:
+                _replace_number(out, random_)
+            case _:
+                out[at : at + 4] = random_.choice(
+                    (b"\xff\xff\xff\xff", b"\x00\x00\x00\x00", b"\x7f\xff\xff\xff", b"\xff\xff\xff\x7f")
+                )
+    return bytes(out)
+
+
+def _replace_number(out: bytearray, random_: random.Random) -> None:
+    """Replace one number of a text by a hostile one."""
+    places = [
+        k
+        for k in range(len(out))
+        if 48 <= out[k] <= 57 and (k == 0 or not (48 <= out[k - 1] <= 57 or out[k - 1] == 46))
+    ]
+    if places:
+        at = end = random_.choice(places)
+        while end < len(out) and chr(out[end]) in "0123456789.e+-":
+            end += 1
+        out[at:end] = random_.choice(NUMBERS).encode()
+
+
+def run(seed: int) -> Verdict:
+    """Damage one file and let its command read it."""
+    name, command = READERS[seed % len(READERS)]
+    random_ = random.Random(seed)
+    with tempfile.TemporaryDirectory() as made:
+        folder = prepared_files(Path(made) / "work")
+        path = folder / name
+        data = damaged(path.read_bytes(), random_)
+        path.write_bytes(data)
+        held, answer = judged(command, folder, endless="--time" in command)
+    return Verdict("files", f"{' '.join(command[:3])} with {name}, {len(data)} bytes", held, answer)

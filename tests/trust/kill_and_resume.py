@@ -1,0 +1,317 @@
+"""Kill every long job at a random moment, resume it, and compare its files with those of an uninterrupted run."""
+
+from __future__ import annotations
+
+import atexit
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+import flarewright
+from flarewright.io.measurement.ghost_model_file import write_ghost_model
+from flarewright.measure.core.parameter_vector import NUMBERS, channel_of
+from flarewright.model.measurement.ghost_model import AberrationGhost, GhostModel
+
+from .verdict import Verdict
+
+KIND = "kill"
+# run a command with checkpoints every 50 ms, so that a tiny job has some
+CHILD = """
+import sys
+from flarewright.cli import common
+common.CHECKPOINT_S = 0.05
+if sys.argv[1] == "render":
+    from flarewright.render.reference import estimator
+    estimator.SAVE_EVERY_S = 0.05
+from flarewright.cli.app import main
+main()
+"""
+# a run that takes longer hangs, seconds; machines are slow and busy
+LOST_S = 240.0
+PROJECT = """
+lens = "heliar-tronnier"
+f_number = 16
+[[lights]]
+field_deg = [7, 3]
+[camera]
+size_px = [120, 80]
+[design]
+brightness = "stop"
+[[design.ghost_targets]]
+ghost = "4-1"
+move_mm = 2.0
+color = [1.0, 0.4, 0.1]
+[[design.ghost_targets]]
+ghost = "3-1"
+move_mm = -3.0
+"""
+SEARCH = ("--searches", "3000", "--lenses", "1", "--time", "600")
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A tiny job of one kind.
+
+    Attributes
+    ----------
+    start : tuple of str
+        The command.
+    made : tuple of str
+        Patterns of the files to compare.
+    resume : tuple of str
+        The command that resumes; empty: the same.
+    sign : str
+        File without which there is nothing to resume, so that the start is repeated.
+    output : callable or None
+        Returns what to compare of stdout.
+    prepare : callable
+        Puts the inputs into a folder.
+    """
+
+    start: tuple[str, ...]
+    made: tuple[str, ...]
+    resume: tuple[str, ...] = ()
+    sign: str = ""
+    output: Callable[[str], object] | None = None
+    prepare: Callable[[Path], None] = lambda _: None
+
+
+def _project(folder: Path) -> None:
+    (folder / "shot.toml").write_text(PROJECT)
+
+
+def _model(folder: Path) -> None:
+    """Write a measured model of five round ghosts."""
+    ghosts = []
+    for k, (place_px, radius_px) in enumerate([(40.0, 20.0), (-25.0, 16.0), (12.0, 50.0), (-8.0, 6.0), (28.0, 34.0)]):
+        numbers = np.zeros(NUMBERS)
+        numbers[0], numbers[10], numbers[20] = place_px, radius_px, 1.0
+        channel = channel_of(numbers, 0)
+        ghosts.append(AberrationGhost(name=str(k), red=channel, green=channel, blue=channel, visible_deg=(0.0, 12.0)))
+    model = GhostModel(
+        size_px=(720, 480), axis_px=(360.0, 240.0), focal_px=1000.0, largest_deg=12.0, constellation_deg=(0.0, 12.0),
+        ghosts=tuple(ghosts),
+    )  # fmt: skip
+    write_ghost_model(folder / "model.json", model)
+
+
+@cache
+def _photographs() -> Path:
+    """Photograph a lens once for all runs."""
+    sys.path.append(str(Path(__file__).parents[1] / "measure"))
+    from synthetic_camera import Setup, make
+
+    place = Path(tempfile.mkdtemp(prefix="trust-photographs-"))
+    atexit.register(shutil.rmtree, place, ignore_errors=True)
+    return make(Setup(size_px=(120, 80), angles_deg=tuple(4.0 * k for k in range(-1, 4)), drift=0.0), place)
+
+
+def _captures(folder: Path) -> None:
+    # with their times, which a resumed run compares
+    shutil.copytree(_photographs(), folder / "photographs", dirs_exist_ok=True)
+
+
+def _merged_until(*stages: str) -> Callable[[Path], None]:
+    """Return what prepares a run whose stages before the killed one are complete."""
+
+    def prepare(folder: Path) -> None:
+        _captures(folder)
+        for stage in ("merge", *stages):
+            place = ("photographs/captures.csv", "-o", "run") if stage == "merge" else ("run",)
+            _run(folder, ("measure", stage, *place))
+
+    return prepare
+
+
+_MEASURED = ("found.json", "model.json", "tracks.json", "compact.json")
+TRIALS = {
+    "design solve": Trial(
+        ("design", "solve", "shot.toml", "-o", "out", *SEARCH), ("out/lens-*", "out/search.json"),
+        ("design", "resume", "out", *SEARCH), "out/search.json", prepare=_project,
+    ),
+    "design resume": Trial(
+        ("design", "resume", "out", *SEARCH), ("out/lens-*", "out/search.json"),
+        prepare=lambda folder: (
+            _project(folder), _run(folder, ("design", "solve", "shot.toml", "-o", "out", "--searches", "1")), None
+        )[-1],
+    ),
+    "design scratch": Trial(
+        ("design", "scratch", "--random", "6", "-o", "out", *SEARCH), ("out/lens-*", "out/search.json"),
+        ("design", "resume", "out", *SEARCH), "out/search.json",
+    ),
+    "design colors": Trial(
+        ("design", "colors", "shot.toml", "-o", "out.toml", "--starts", "48"), ("out.toml",), prepare=_project
+    ),
+    # what a seed finds depends on the time that it gets
+    "design benchmark": Trial(
+        ("design", "benchmark", "heliar", "--cpu-time", "0.2", "--seeds", "4", "--report", "out.html", "--json"), (),
+        output=lambda text: [run["seed"] for run in json.loads(text)["runs"]],
+    ),
+    "measure explain": Trial(
+        ("measure", "explain", "model.json", "-o", "out", "--light", "9", *SEARCH),
+        ("out/lens-*", "out/search.json", "out/explanation.txt"), prepare=_model,
+    ),
+    "measure run": Trial(
+        ("measure", "run", "photographs/captures.csv", "-o", "run"),
+        tuple(f"run/{name}" for name in ("frames/*.exr", "merged.json", *_MEASURED)), prepare=_captures,
+    ),
+    "measure merge": Trial(
+        ("measure", "merge", "photographs/captures.csv", "-o", "run"), ("run/frames/*.exr", "run/merged.json"),
+        prepare=_captures,
+    ),
+    "measure find": Trial(("measure", "find", "run"), ("run/found.json",), prepare=_merged_until()),
+    "measure fit": Trial(("measure", "fit", "run"), ("run/model.json",), prepare=_merged_until("find")),
+    "measure track": Trial(("measure", "track", "run"), ("run/tracks.json",), prepare=_merged_until("find", "fit")),
+    "measure compress": Trial(
+        ("measure", "compress", "run"), ("run/compact.json",), prepare=_merged_until("find", "fit", "track")
+    ),
+    "predict": Trial(
+        ("predict", "heliar-tronnier", "--fstop", "16", "--quality", "draft", "--samples", "15", "-o", "out.html",
+         "--json"),
+        ("out.html",), output=str,
+    ),
+    "render": Trial(
+        ("render", "heliar-tronnier", "--light", "10,5", "--quality", "reference", "--samples", "200000", "--error",
+         "0.0001", "--size", "96x64", "--no-png", "-o", "out.exr"),
+        ("out.exr",), ("render", "--resume", "out.state.npz", "--samples", "200000", "--error", "0.0001", "--no-png",
+                       "-o", "out.exr"), "out.state.npz",
+    ),
+    "gallery": Trial(("gallery", "-o", "out", "--size", "32x18"), ("out/*.png", "out/index.html")),
+    "warm-up": Trial(("warm-up",), ("cache/*/*.nbi",)),
+}  # fmt: skip
+"""One tiny job for every entry of `flarewright.workflow.long_jobs.JOBS`, by its words."""
+
+
+# minutes each on a busy machine, longer than the rig waits for an input; the slow tests run them
+LONG = {"measure run", "measure find", "measure fit", "measure track", "measure compress", "gallery", "warm-up"}
+
+
+def run(seed: int) -> Verdict:
+    """Kill the job that the seed chooses, one of the shorter ones."""
+    jobs = [name for name in TRIALS if name not in LONG]
+    return kill_and_resume(jobs[seed % len(jobs)], seed // len(jobs))
+
+
+def kill_and_resume(job: str, seed: int) -> Verdict:
+    """Kill a job at a random moment, resume it, and compare it with an uninterrupted run.
+
+    Parameters
+    ----------
+    job : str
+        Key of `TRIALS`.
+    seed : int
+        Even: SIGKILL; odd: SIGTERM.
+
+    Returns
+    -------
+    Verdict
+    """
+    trial, kind = TRIALS[job], (signal.SIGKILL, signal.SIGTERM)[seed % 2]
+    wanted, took_s, prepared = _uninterrupted(job)
+    moment = random.Random(f"{job} {seed}").uniform(0.0, took_s)
+    subject = f"{job}, {kind.name} after {moment:.2f} of {took_s:.2f} s"
+    with tempfile.TemporaryDirectory(prefix="trust-") as text:
+        folder = Path(text)
+        shutil.copytree(prepared, folder, dirs_exist_ok=True, copy_function=shutil.copy2)
+        killed = _started(folder, trial.start)
+        ended = _ended(killed, moment)
+        if ended is None:
+            killed.send_signal(kind)
+            ended = _ended(killed, LOST_S)
+        if ended is None:
+            killed.kill()
+            killed.communicate()
+            return Verdict(KIND, subject, False, f"it goes on for {LOST_S:g} s after the signal")
+        _, said = ended
+        # Python handles no signals while it starts and ends
+        if kind is signal.SIGTERM and (killed.returncode not in (0, 130, -kind) or "Traceback" in said):
+            return Verdict(KIND, subject, False, f"exit code {killed.returncode}: {said[-300:]}")
+        again = trial.resume if trial.sign and (folder / trial.sign).exists() else trial.start
+        try:
+            code, out, said = _run(folder, again)
+        except subprocess.TimeoutExpired:
+            return Verdict(KIND, subject, False, f"resuming takes longer than {LOST_S:g} s")
+        if code:
+            return Verdict(KIND, subject, False, f"resuming ends with {code}: {said[-300:]}")
+        made = _made(folder, trial, out)
+    other = sorted(name for name in wanted.keys() | made.keys() if wanted.get(name) != made.get(name))
+    if other:
+        return Verdict(KIND, subject, False, f"differs from an uninterrupted run: {', '.join(other)}")
+    return Verdict(KIND, subject, True, f"{len(made)} results are the same")
+
+
+@cache
+def _uninterrupted(job: str) -> tuple[dict[str, object], float, Path]:
+    """Run a job once without an end; return its files, its time, and a folder with its inputs."""
+    trial, place = TRIALS[job], Path(tempfile.mkdtemp(prefix="trust-whole-"))
+    atexit.register(shutil.rmtree, place, ignore_errors=True)
+    prepared, whole = place / "prepared", place / "whole"
+    prepared.mkdir()
+    trial.prepare(prepared)
+    if job != "warm-up":
+        # compile the kernels before the time counts
+        shutil.copytree(prepared, whole, copy_function=shutil.copy2)
+        _run(whole, trial.start)
+        shutil.rmtree(whole)
+    shutil.copytree(prepared, whole, copy_function=shutil.copy2)
+    started = time.monotonic()
+    code, out, said = _run(whole, trial.start)
+    assert code == 0, said
+    took_s = time.monotonic() - started
+    return _made(whole, trial, out), took_s, prepared
+
+
+def _made(folder: Path, trial: Trial, out: str) -> dict[str, object]:
+    """Return what a run has made: the contents of its files, and what counts of its output."""
+    paths = [path for pattern in trial.made for path in folder.glob(pattern)]
+    files: dict[str, object] = {str(path.relative_to(folder)): _lasting(path) for path in paths}
+    return files if trial.output is None else files | {"stdout": trial.output(out)}
+
+
+def _lasting(path: Path) -> bytes:
+    """Return the bytes of a file that do not differ between runs."""
+    if path.name == "search.json":
+        return json.dumps(json.loads(path.read_text()) | {"seconds": 0, "digest": ""}).encode()
+    # the number of a signature's file depends on the order of compilation
+    return b"" if path.suffix == ".nbi" else path.read_bytes()
+
+
+def _run(folder: Path, words: tuple[str, ...]) -> tuple[int, str, str]:
+    process = _started(folder, words)
+    ended = _ended(process, LOST_S)
+    if ended is None:
+        process.kill()
+        process.communicate()
+        raise subprocess.TimeoutExpired(words, LOST_S)
+    return process.returncode, *ended
+
+
+def _started(folder: Path, words: tuple[str, ...]) -> subprocess.Popen[str]:
+    # the same sources from another folder
+    environment = {**os.environ, "PYTHONPATH": str(Path(flarewright.__file__).parents[1])}
+    if words == ("warm-up",):
+        environment["NUMBA_CACHE_DIR"] = str(folder / "cache")
+    return subprocess.Popen(
+        [sys.executable, "-c", CHILD, *words], cwd=folder, env=environment, text=True, stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+
+
+def _ended(process: subprocess.Popen[str], seconds: float) -> tuple[str, str] | None:
+    """Wait for a process; return its output, or None if it still runs."""
+    try:
+        return process.communicate(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        return None

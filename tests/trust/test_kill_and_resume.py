@@ -1,0 +1,60 @@
+"""Every long job is killed and resumes to the result of an uninterrupted run."""
+
+from pathlib import Path
+
+import pytest
+
+from flarewright.workflow.long_jobs import JOBS, SAME, job_of
+
+from .commands import commands
+from .kill_and_resume import TRIALS, kill_and_resume
+
+# commands that end within a minute on any machine and any sensible input
+SHORT = {
+    "ghosts", "lenses", "edit", "lens show", "lens check", "lens convert", "lens schema", "looks save",
+    "coating list", "coating plot", "project init", "project check", "project schema", "scene init", "scene check",
+    "scene schema", "design target", "design resize", "design move-stop", "design identify", "measure report",
+    "measure replay",
+}  # fmt: skip
+
+
+def test_every_command_is_in_the_list_or_short():
+    long = {" ".join(job.words) for job in JOBS}
+    assert not long & SHORT
+    assert {name for name, _ in commands()} == long | SHORT
+
+
+def test_every_long_job_is_killed_by_the_rig_and_documented():
+    assert {" ".join(job.words) for job in JOBS} == set(TRIALS)
+    page = (Path(__file__).parents[2] / "docs" / "cli.md").read_text("utf-8")
+    for job in JOBS:
+        for file in job.keeps.split(", "):
+            assert file.replace(f"{job.words[-1]}.journal", "STAGE.journal") in page
+
+
+@pytest.mark.parametrize(
+    ("line", "resumes"),
+    [
+        ("measure run captures.csv -o run", True),
+        ("predict heliar-tronnier --output=a.html", True),
+        ("predict heliar-tronnier --cache a.npz", True),
+        ("predict heliar-tronnier", False),
+        ("design benchmark heliar --report a.html", True),
+        ("design benchmark heliar", False),
+    ],
+)
+def test_a_job_knows_whether_it_keeps_its_work(line, resumes):
+    words = line.split()
+    job = job_of(words)
+    assert job.resume == SAME
+    assert job.kept(words) is resumes
+    assert job_of(["ghosts", "heliar-tronnier"]) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [0, 1], ids=["SIGKILL", "SIGTERM"])
+@pytest.mark.parametrize("job", TRIALS)
+def test_a_killed_job_resumes_to_the_same_files(job, kind):
+    for seed in (kind, kind + 2):
+        verdict = kill_and_resume(job, seed)
+        assert verdict.held, verdict

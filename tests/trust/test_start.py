@@ -1,0 +1,29 @@
+"""The command starts in any environment: closed streams, and settings of libraries that they cannot read."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from flarewright.cli.app import _check_threads
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")
+def test_a_closed_error_stream_changes_no_result(tmp_path):
+    command = f"exec {sys.executable} -m flarewright lens check nosuch 2>&-"
+    done = subprocess.run(["sh", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stdout.startswith("nosuch: rejected, 'nosuch' is neither a shipped lens nor a file")
+    assert len(done.stdout.splitlines()) == 1
+
+
+def test_a_number_of_threads_that_is_none_is_ignored(monkeypatch, capsys):
+    for text, kept in (("abc", False), ("0", False), ("2", True)):
+        monkeypatch.setenv("NUMBA_NUM_THREADS", text)
+        _check_threads()
+        assert ("NUMBA_NUM_THREADS" in os.environ) == kept
+        sentence = f"flarewright: NUMBA_NUM_THREADS is {text!r}, no whole number above 0: ignored\n"
+        assert capsys.readouterr().err == ("" if kept else sentence)

@@ -1,0 +1,51 @@
+"""The focal lengths of sixty published `.zmx` files, against a separate paraxial trace of the numbers in each file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from flarewright.errors import LensError
+from flarewright.io.lens.glass_catalogue import by_name
+from flarewright.optics.lens.paraxial import first_order
+from flarewright.render.scene.resolve import load_lens
+
+CORPUS = Path(__file__).parents[3] / "shared" / "zmx_corpus"
+FILES = sorted(CORPUS.glob("*.zmx"))
+# another medium than air in front, and odd aspheres, which the reader refuses with this reason
+REFUSED = {
+    "Fujifilm_Fujinon_23mm_F2.0_Super_EBC_(X100F).zmx": "XOSPHERE",
+    "Fujifilm_Fujinon_GF30mm_F3.5_R_WR.zmx": "XOSPHERE",
+    "Fujifilm_Fujinon_XC15-45mm_F3.5-5.6_OIS_PZ.zmx": "XOSPHERE",
+    "Fujifilm_Fujinon_XF200mm_F2_R_LM_OIS_WR_with_Fujifilm_Fujinon_XF1.4X_TC_F2_WR.zmx": "XOSPHERE",
+    "Nikon_AF-S_Zoom-Nikkor_28-70mm_f2.8D_IF-ED.zmx": "XOSPHERE",
+    "Nikon_R-UW_AF_Zoom-Nikkor_20-35mm_f2.8.zmx": "the lens stands in a medium",
+}
+
+pytestmark = pytest.mark.skipif(not FILES, reason="the corpus is not part of the repository")
+
+
+def focal_length(text):
+    """Trace a ray parallel to the axis through the surfaces of a file and return h / slope, mm."""
+    blocks = [part.splitlines() for part in text.split("\nSURF ")[1:]]
+    h, slope, before = 1.0, 0.0, 1.0
+    for lines in blocks[1:-1]:
+        words = {line.split()[0]: line.split()[1:] for line in lines[1:] if line.split()}
+        glass, square = words.get("GLAS"), [line.split()[2] for line in lines if line.split()[:2] == ["PARM", "1"]]
+        after = 1.0 if glass is None else float(glass[3]) if len(glass) > 4 else by_name(glass[0]).n_d
+        curvature = float(words["CURV"][0]) + 2.0 * (float(square[0]) if words.get("TYPE") == ["EVENASPH"] else 0.0)
+        slope = (before * slope + (before - after) * curvature * h) / after
+        h, before = h + slope * float(words["DISZ"][0].replace("INFINITY", "0")), after
+    return -1.0 / slope
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_the_focal_length_follows_from_the_numbers_of_the_file(path):
+    if (reason := REFUSED.get(path.name)) is not None:
+        with pytest.raises(LensError, match=reason):
+            load_lens(path)
+        return
+    data = path.read_bytes()
+    text = data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    assert first_order(load_lens(path)).efl == pytest.approx(focal_length(text.replace("\r", "")), rel=1e-6)
