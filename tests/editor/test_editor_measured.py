@@ -130,7 +130,7 @@ def test_a_light_at_rest_beyond_the_photographed_range_shows_the_limit_and_says_
     screen.session.do("move_light", {"light": 0, "x": 40.0, "y": 0.0})
     assert screen.wait(60.0)
     assert screen.problem == ""
-    assert any("at the limit, 25 degrees" in line for line in state(screen)["remarks"])
+    assert any("at the limit, 25 degrees" in line for line in state(screen)["picture"]["remarks"])
     screen.session.do("set_fields", {"values": {"f_number": 4.0}})
     assert screen.session.project.f_number == 4.0
 

@@ -43,8 +43,14 @@ def test_its_handle_lies_on_its_light_and_moves_it(opened):
     # outside the captured range the picture is that of the limit, with a remark
     tab.page.fill("[name=light_x]", "60")
     tab.page.press("[name=light_x]", "Enter")
-    tab.until("flarewright.state.remarks.some(remark => remark.includes('it is drawn at the limit'))")
+    tab.until("flarewright.state.picture.remarks.some(remark => remark.includes('it is drawn at the limit'))")
     assert not tab.state()["picture"]["problem"]
+    # an answer from before this picture may arrive late: picture and remarks stay those of the newer one
+    tab.js(
+        "(() => { const late = structuredClone(flarewright.state);"
+        "Object.assign(late.picture, {number: late.picture.number - 1, remarks: []}); flarewright.take(late); })()"
+    )
+    assert any("it is drawn at the limit" in remark for remark in tab.state()["picture"]["remarks"])
     tab.page.click("#undo")
     tab.rest()
 

@@ -39,7 +39,6 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
     session = screen.session
     project, history = session.project, session.history
     table = measured_facts(project) if is_measured(project) else prescription(project)
-    shown = screen.picture
     return {
         "revision": session.revision,
         "file": session.file,
@@ -70,7 +69,6 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
             "sensor": list(project.camera.sensor),
         },
         "picture": _picture(screen),
-        "remarks": list(shown.remarks) if shown is not None else [],
         "solve": solve_of(solver),
         "aces": aces_available(),
         "false_colours": [[stops, "#{:02x}{:02x}{:02x}".format(*colour)] for stops, colour in FALSE_COLOURS],
@@ -88,6 +86,8 @@ def _picture(screen: Screen) -> dict[str, Any]:
         "current": shown is not None and pictured(shown.project) == pictured(screen.session.project),
         # places of its lights: a drag may have moved them during encoding
         "lights": [] if shown is None else [light.field_deg for light in shown.project.lights],
+        # part of the picture, so that no older answer replaces those of a newer picture
+        "remarks": [] if shown is None else list(shown.remarks),
     }
 
 

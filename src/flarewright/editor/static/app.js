@@ -368,8 +368,8 @@ function status() {
   // called for each picture of a drag
   if (grade.textContent !== words) grade.textContent = words;
   size.textContent = `${camera.size_px.join(' × ')} px · ${frame.sensor.map((mm) => Number(mm.toFixed(2))).join(' × ')} mm`;
-  remark.textContent = app.state.remarks.join(' · ');
-  remark.title = app.state.remarks.join('\n');
+  remark.textContent = picture.remarks.join(' · ');
+  remark.title = picture.remarks.join('\n');
 }
 
 // --------------------------------------------------------------------------------------------------------------- tabs
@@ -512,7 +512,8 @@ function hear(event) {
   if (event.type === 'progress') { working(event.what, event.part); return; }
   if (event.type === 'export') { working('EXR', event.part); return; }
   if (event.type === 'ghosts') { working('', 1); loadGhosts(); return; }
-  if (!state) return;
+  // it may be newer than the first state, which is on its way
+  if (!state) { reload(); return; }
   // the brightness of the target's ghosts follows the last final picture
   if (event.type === 'matched') app.view.refreshTarget();
   if (event.type === 'picture') {
@@ -523,11 +524,9 @@ function hear(event) {
     if (event.number !== app.view.shownNumber) app.view.refresh(true);
     update();
     if (event.grade === 'working') app.view.refreshTarget();
-    if (event.grade === 'final') app.remarks();
   }
   if (event.type === 'solve') { state.solve = event; panels.target.update?.(state); }
 }
-app.remarks = latest(async () => { const fresh = await get('api/state'); if (app.state) { app.state.remarks = fresh.remarks; status(); } });
 
 app.view = viewport($('view'), app);
 const parts = [header()];
