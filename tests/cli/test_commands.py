@@ -71,6 +71,7 @@ class FakeRendering:
     summary: dict = field(default_factory=lambda: {"efl_mm": 1.0, "far": float("inf")})
     remarks: tuple[str, ...] = ("a remark",)
     ledger: None = None
+    profile: None = None
 
 
 @pytest.fixture

@@ -12,7 +12,14 @@ from flarewright.model import Camera, Light, Lines, Output, Polygon, Project, Qu
 from flarewright.optics.colour.rgb import luminance_weights
 from flarewright.optics.pupil.light_shape import light_outline, parts
 from flarewright.optics.pupil.polygon import closed, points
-from flarewright.render.ghosts.extent_blur import blur_by_extent, extent_coverage, shape_kernel, spread_within
+from flarewright.render.ghosts import extent_blur
+from flarewright.render.ghosts.extent_blur import (
+    blur_by_extent,
+    extent_coverage,
+    shape_kernel,
+    spread_window,
+    spread_within,
+)
 from flarewright.render.ghosts.paraxial_ghosts import spread_light
 from flarewright.render.render import render
 from flarewright.render.scene.area_lights import spread_border
@@ -270,6 +277,28 @@ def test_a_window_is_spread_like_the_whole():
     a, b = (side // 2 for side in kernel.shape)
     whole = blur_by_extent(sheet, kernel)[a:-a, b:-b]
     assert np.abs(spread_within(sheet, kernel) - whole).max() < 1e-12
+
+
+@pytest.mark.parametrize("most_taps", [0, 300])
+@pytest.mark.parametrize("rows", [slice(0, 9), slice(20, 31), slice(41, 50)])
+def test_the_lit_window_of_a_spread_picture_is_the_whole_one(rows, most_taps, monkeypatch):
+    """By Fourier transform and tap by tap; beside the window there is no light."""
+    monkeypatch.setattr(extent_blur, "MOST_TAPS", most_taps)
+    sheet = np.zeros((50, 60, 3), dtype=np.float32)
+    sheet[rows, 40:60] = np.random.default_rng(4).random(sheet[rows, 40:60].shape)
+    kernel = shape_kernel(closed(np.array([[-4.0, -3.0], [6.0, -1.0], [2.0, 5.0]])))
+    whole = spread_within(sheet.astype(float), kernel)
+    light, (x, y) = spread_window(sheet, kernel)
+    found = np.zeros_like(whole)
+    found[y : y + light.shape[0], x : x + light.shape[1]] = light
+    assert np.abs(found - whole).max() < 1e-6 * whole.max()
+    assert light.shape[0] * light.shape[1] < 0.5 * whole.shape[0] * whole.shape[1]
+
+
+def test_a_dark_picture_has_an_empty_window():
+    kernel = shape_kernel(closed(np.array([[-4.0, -3.0], [6.0, -1.0], [2.0, 5.0]])))
+    light, _ = spread_window(np.zeros((50, 60, 3), dtype=np.float32), kernel)
+    assert light.size == 0
 
 
 @pytest.mark.parametrize("reach", [(3, 5), (12, 4), (1, 70)])

@@ -22,6 +22,7 @@ from ..optics.lens.paths import direct_path, ghost_paths
 from ..optics.lens.surface_shape import ideal
 from ..optics.scattering.sensor_grating import grating_orders
 from ..typing import Floats, Progress
+from .ghosts.cost import CostMeter, RenderProfile
 from .ghosts.ghost_pass import plain_level, render_ghosts
 from .image.compose import beauty
 from .image.gamut import apply_gamut
@@ -66,6 +67,8 @@ class Rendering:
         Sentences for the user: repairs, estimates, and light that was left out.
     ledger : Ledger or None
         The energy ledger, if requested.
+    profile : RenderProfile or None
+        What each ghost cost, if requested.
     """
 
     project: Project
@@ -73,6 +76,7 @@ class Rendering:
     summary: dict[str, Any]
     remarks: tuple[str, ...]
     ledger: Ledger | None = None
+    profile: RenderProfile | None = None
 
     def _repr_png_(self) -> bytes:
         """Return the beauty as PNG for notebooks, with the display of the PNG beside an EXR."""
@@ -89,6 +93,7 @@ def render(
     progress: Progress | None = None,
     run: ReferenceRun | None = None,
     ledger: bool = False,
+    profile: bool = False,
     **settings: Unpack[Settings],
 ) -> Rendering:
     """Render the flare of a project, or of a lens with a few settings.
@@ -106,6 +111,8 @@ def render(
         Reference quality: the state to resume, where to save it, and the time limit.
     ledger : bool
         Whether to compute the energy ledger. It costs about a second; in reference quality nothing.
+    profile : bool
+        Final quality: whether to time the stages of each ghost and count its work.
     **settings : Settings
         Fields of `Project` by name; they override the fields of a given project. `coating` also accepts the texts of
         the command line's `--coating`, such as "early-multicoat", "preset:staggered" or a coating file.
@@ -129,6 +136,7 @@ def render(
     >>> render("canon-28-80", f_number=8, coating="early-multicoat", lights=[Light(field_deg=(10, 5))]) # doctest: +SKIP
     """
     project = project_of(project, **settings)
+    costs = CostMeter() if profile and project.quality.mode == "final" else None
     # a lower bound: beauty, ghosts and starburst exist in every render
     check_memory(prod(project.camera.size_px) * PIXEL_BYTES * (3 if project.output.starburst else 2), spare_bytes())
     settled = resolve_project(project)
@@ -159,7 +167,7 @@ def render(
     else:
         if project.output.starburst and prod(project.camera.size_px) <= PARALLEL_PX:
             starburst = _start_early(starburst, threads)
-        drawn = _ghosts(settled, seen, art, threads, progress)
+        drawn = _ghosts(settled, seen, art, threads, progress, costs)
     passes = list(drawn.passes)
     scattered: dict[str, Any] = {}
     reported: tuple[str, ...] = ()
@@ -202,6 +210,7 @@ def render(
             *_mask_remarks(mask),
         ),
         account if ledger else None,
+        None if costs is None else RenderProfile(costs.search_s, costs.costs()),
     )
 
 
@@ -266,12 +275,13 @@ def _ghosts(
     art: ResolvedArt,
     threads: int | None,
     progress: Progress | None,
+    costs: CostMeter | None,
 ) -> _Drawn:
     project = settled.project
     paths = ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None)
     singles = project.output.brightest if project.output.layers == "ghosts" else 0
     ghosts = render_ghosts(
-        shots, paths, project.quality, singles=singles, art=art.paths, threads=threads, progress=progress
+        shots, paths, project.quality, singles=singles, art=art.paths, threads=threads, progress=progress, costs=costs
     )
     facts = {
         "drawn": ghosts.drawn,
@@ -296,7 +306,7 @@ def _ghosts(
     if project.quality.mode == "draft":
         return replace(two, remarks=(*reported, "draft quality has no ghosts of four reflections; final quality has"))
     plain = plain_level(shots, paths, threads) if art.paths else ghosts.level
-    four = _fours(settled, shots, (plain, ghosts.level), singles, threads, progress)
+    four = _fours(settled, shots, (plain, ghosts.level), singles, threads, progress, costs)
     return _Drawn(
         two.passes + four.passes, two.others + four.others, {**two.facts, **four.facts}, two.remarks + four.remarks
     )
@@ -309,6 +319,7 @@ def _fours(
     singles: int | None,
     threads: int | None,
     progress: Progress | None,
+    costs: CostMeter | None,
 ) -> _Drawn:
     """Draw the four-reflection ghosts above the limit; `levels` of two-reflection ghosts without and with art."""
     from .reference.four_reflections import find_four_reflections
@@ -319,7 +330,7 @@ def _fours(
     art = resolve_art(settled, found.paths)
     ghosts = render_ghosts(
         shots, found.paths, quality.replace(cull=0.0), singles=singles, art=art.paths, level=levels[1],
-        faintest=limit * levels[0], threads=threads, progress=progress,
+        faintest=limit * levels[0], threads=threads, progress=progress, costs=costs,
     )  # fmt: skip
     muted = {name for name, changed in art.paths.items() if not changed.enabled}
     dark, part = found.left_out(muted.union(ghosts.names))

@@ -63,7 +63,7 @@ def render(options: RenderOptions) -> None:
 
     try:
         with naming_rules(flags, settings):
-            rendering = _render(settings, options.threads, run, options.ledger)
+            rendering = _render(settings, options, run)
     except KeyboardInterrupt:
         if run is not None and run.state_file is not None and run.state_file.exists():
             print_remarks([f"to resume: flarewright render --resume {run.state_file} -o {options.output}"])
@@ -75,8 +75,14 @@ def render(options: RenderOptions) -> None:
     print_remarks(remarks)
     if rendering.ledger is not None:
         _print_ledger(rendering.ledger)
+    profiled = {}
+    if rendering.profile is not None:
+        from .profile_table import print_profile
+
+        print_profile(rendering.profile)
+        profiled = {"profile": rendering.profile.as_data()}
     if options.as_json:
-        print_json({**rendering.summary, **files, "remarks": remarks})
+        print_json({**rendering.summary, **profiled, **files, "remarks": remarks})
     else:
         print_remarks(f"wrote {name}" for name in (files["output"], files.get("preview")) if name)
 
@@ -181,16 +187,14 @@ def _print_ledger(ledger: Ledger) -> None:
     Console(stderr=True, markup=False, highlight=False).print(table)
 
 
-def _render(project: Project, threads: int | None, run: ReferenceRun | None, ledger: bool) -> Rendering:
+def _render(project: Project, options: RenderOptions, run: ReferenceRun | None) -> Rendering:
     """Render with a progress bar on a terminal."""
-    draw = _renderer(project, threads, run, ledger)
+    draw = _renderer(project, options, run)
     with one_bar("rendering") as progress:
         return draw(progress=progress)
 
 
-def _renderer(
-    project: Project, threads: int | None, run: ReferenceRun | None, ledger: bool
-) -> Callable[..., Rendering]:  # fmt: skip
+def _renderer(project: Project, options: RenderOptions, run: ReferenceRun | None) -> Callable[..., Rendering]:
     """Return the render function of a project, of a lens or of a measured flare; it takes a progress callback."""
     from functools import partial
 
@@ -199,14 +203,19 @@ def _renderer(
     if is_ghost_model_file(project.lens):
         from ...measure.replay.measured_project import render_measured
 
-        if ledger:
-            raise ProjectError(f"{project.lens} is a measured flare, which has no ledger; omit --ledger")
+        for flag, given in (("--ledger", options.ledger), ("--profile", options.profile)):
+            if given:
+                raise ProjectError(f"{project.lens} is a measured flare, which has no {flag[2:]}; omit {flag}")
         return partial(render_measured, project)
     from ...render.render import render as render_project
     from ...render.warmup import compile_for_render
 
-    compile_for_render(project, threads, lambda sentence: print_remarks([sentence]), first_run_bar)
-    return partial(render_project, project, threads=threads, run=run, ledger=ledger)
+    if options.profile and project.quality.mode != "final":
+        raise ProjectError(f"--profile is for final quality, not for {project.quality.mode}; omit it")
+    compile_for_render(project, options.threads, lambda sentence: print_remarks([sentence]), first_run_bar)
+    return partial(
+        render_project, project, threads=options.threads, run=run, ledger=options.ledger, profile=options.profile
+    )
 
 
 def _write(

@@ -9,11 +9,13 @@ from .sequential import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_lanes
 
 # a FLAT leaf is drawn without the midpoints of its edges, a LEAF with them
 UNKNOWN, LEAF, SPLIT, EMPTY, FLAT = 0, 1, 2, 3, 4
-# away from the rim, largest error of positions over the size of the cell; the error in area is twice that, and more
-# would show as triangles
-INNER_BEND = 0.005
-# light is interpolated linearly between nodes: cells in which it departs from that by more than this part are halved
-BENT_WEIGHT = 0.002
+# why a cell is halved, in bits above those of its verdict: `REASON * k + SPLIT` for the k-th of `REASONS`
+REASON = 8
+REASONS = (
+    "all rays end", "near a rim", "some rays end", "corners of a rim", "bend of a rim", "fringes", "bend of places",
+    "fold", "bend of areas", "bend of weights",
+)  # fmt: skip
+ALL_END, NEAR_RIM, SOME_END, RIM_CORNERS, RIM_BEND, FRINGES, PLACE_BEND, FOLD, AREA_BEND, WEIGHT_BEND = range(10)
 # folds are invisible in a cell whose image lies within this part of the tolerance on either side of a line
 THIN = 0.1
 # largest cell in fringes, pixels: the pattern of a small cell usually depends on a single edge
@@ -31,19 +33,21 @@ FAR_RAYS, FAR_RADII, FAR_LEVEL = 3, 2.0, 2
 
 @borrowing
 def _classify(data, nodes, crossings, iris, level, h, limits, values):
-    """Classify a cell of 3 x 3 nodes as EMPTY, SPLIT, LEAF or FLAT; `values`, shape (9,), is scratch.
+    """Classify a cell of 3 x 3 nodes as EMPTY, LEAF, FLAT or SPLIT with its reason; `values`, shape (9,), is scratch.
 
     The triangle fan of a LEAF uses the midpoints of its edges, which leaves a quarter of the measured error.
     """
     iris_radius, iris_inner = iris
-    rim_level, max_level, tolerance, flux_tolerance, fringe_tolerance, faint_radius, scale, view_radius, slivers = (
-        limits
-    )
+    tolerance, fringe_tolerance, scale, view_radius = (
+        limits.tolerance, limits.fringe_tolerance, limits.scale, limits.view_radius
+    )  # fmt: skip
     if rejected(data, nodes, crossings, iris_radius, 0.25):
         # a sliver may pass between rays that end at different surfaces
-        doubtful = level < SLIVER_LEVEL + slivers and _ends_differ(data, nodes, slivers)
-        return SPLIT if doubtful or _may_hide_horn(data, nodes, level) else EMPTY
-    if level >= max_level:
+        doubtful = level < SLIVER_LEVEL + limits.slivers and _ends_differ(data, nodes, limits.slivers)
+        if doubtful:
+            return _split(ALL_END)
+        return _split(NEAR_RIM) if _may_hide_horn(data, nodes, level) else EMPTY
+    if level >= limits.max_level:
         return LEAF
     x_low, x_high, y_low, y_high = np.inf, -np.inf, np.inf, -np.inf
     alive = 0
@@ -59,50 +63,63 @@ def _classify(data, nodes, crossings, iris, level, h, limits, values):
         # if the landing rays lie far outside the picture, assume the same of the light beside the rays that end, whose
         # place is unknown
         far = FAR_RADII * view_radius
-        return EMPTY if alive >= FAR_RAYS and level >= FAR_LEVEL and out2 > far * far else SPLIT
+        return EMPTY if alive >= FAR_RAYS and level >= FAR_LEVEL and out2 > far * far else _split(SOME_END)
     if out2 > view_radius * view_radius:
         return FLAT
     extent = max(x_high - x_low, y_high - y_low) * scale
-    error = 0.0
+    error, reason = 0.0, RIM_BEND
     at_rim, at_fringes = False, False
     # the rim of the bundle determines its flux, so resolve it even for a small ghost
     for limit in range(crossings, -1, -1):
         low, high, bend = _limit_range(data, nodes, limit, iris_radius, values)
         # the blades lie between the inscribed and the circumscribed circle of the iris
-        if limit > 0 and low * iris_radius > faint_radius:
+        if limit > 0 and low * iris_radius > limits.faint_radius:
             return FLAT
         if low < 1.0 and high > (1.0 if limit == 0 else iris_inner / iris_radius):
             if limit > 0 and fringe_tolerance > 0.0:
                 at_fringes = True
                 continue
             # a rim formed by several surfaces has corners that a coarse cell misses
-            if level < rim_level:
-                return SPLIT
+            if level < limits.rim_level:
+                return _split(RIM_CORNERS)
             at_rim = True
             part = bend / max(high - low, 1e-12)
-            error = max(error, part * h / flux_tolerance, part * extent / tolerance)
+            error = max(error, part * h / limits.flux_tolerance, part * extent / tolerance)
     if at_fringes and extent > FRINGE_CELL:
-        return SPLIT
+        return _split(FRINGES)
     if extent >= 1.0:
         bend_x, bend_y = _bend(data, nodes, np.int64(X)), _bend(data, nodes, np.int64(Y))
         # away from the rim an error that is small compared with the cell is invisible
         allowed = tolerance
         if not at_rim:
-            allowed = max(tolerance, min(INNER_BEND * extent, fringe_tolerance if at_fringes else np.inf))
-        error = max(error, np.sqrt(bend_x * bend_x + bend_y * bend_y) * scale / allowed)
+            allowed = max(tolerance, min(limits.inner_bend * extent, fringe_tolerance if at_fringes else np.inf))
+        error, reason = _worse(error, reason, np.sqrt(bend_x * bend_x + bend_y * bend_y) * scale / allowed, PLACE_BEND)
     # what lies on a line folds and crowds across it, where nothing is seen of that
-    if extent > 2.0 and not _thin(data, nodes, THIN * tolerance / scale):
+    if extent > limits.fold_px and not _thin(data, nodes, THIN * tolerance / scale):
         area_low, area_high = _fan_areas(data, nodes)
         if area_low * area_high <= 0.0:
-            return SPLIT
-        if extent > 5.0:
+            return _split(FOLD)
+        if extent > limits.area_px:
             ratio = max(abs(area_low), abs(area_high)) / max(min(abs(area_low), abs(area_high)), 1e-300)
-            error = max(error, 4.0 * (ratio - 1.0))
+            error, reason = _worse(error, reason, 4.0 * (ratio - 1.0) / limits.area_ratio, AREA_BEND)
     # errors in flux count for cells of any size
-    error = max(error, _bend(data, nodes, np.int64(WEIGHT)) / (BENT_WEIGHT * abs(data[nodes[4], WEIGHT]) + 1e-300))
+    bend = _bend(data, nodes, np.int64(WEIGHT)) / (limits.weight_bend * abs(data[nodes[4], WEIGHT]) + 1e-300)
+    error, reason = _worse(error, reason, bend, WEIGHT_BEND)
     if error > 4.0:
-        return SPLIT
+        return _split(reason)
     return LEAF if error > 1.0 else FLAT
+
+
+@inlined
+def _split(reason):
+    """Return the verdict on a cell that is halved for this reason."""
+    return REASON * reason + SPLIT
+
+
+@inlined
+def _worse(error, reason, other, its_reason):
+    """Return the larger of two errors and its reason."""
+    return (other, its_reason) if other > error else (error, reason)
 
 
 @borrowing
@@ -225,6 +242,8 @@ def build_mesh(steps, lens, light, crossings, iris, box, coarse, limits):
         Traced nodes (`kernels.tracing.sequential`).
     triangles : ndarray, shape (T, 3), int64
         Counter-clockwise in the pupil. Neighbouring cells differ by one halving at most and share all their nodes.
+    halved : ndarray, shape (10,), int64
+        Number of cells that were halved for each of `REASONS`.
     """
     (nx, ny), max_level = coarse, limits.max_level
     # the lattice of all possible nodes has room for `depth` halvings, and grows when a cell needs more
@@ -244,6 +263,9 @@ def build_mesh(steps, lens, light, crossings, iris, box, coarse, limits):
     # an int literal has another type and would compile the callees a second time
     n_nodes = np.int64(0)
     nodes, values = np.empty(9, dtype=np.int64), np.empty(9)
+    halved = np.empty(len(REASONS), dtype=np.int64)
+    for k in range(halved.size):
+        halved[k] = 0
     cells = np.empty(nx * ny, dtype=np.int64)
     for k in range(nx * ny):
         cells[k] = k
@@ -264,8 +286,9 @@ def build_mesh(steps, lens, light, crossings, iris, box, coarse, limits):
             verdict = EMPTY
             for v in range(data.shape[0]):
                 found = _classify(data[v], nodes, crossings, iris, level, h, limits, values)
-                if found == SPLIT:
+                if found % REASON == SPLIT:
                     verdict = SPLIT
+                    halved[found // REASON] += 1
                     break
                 if found == LEAF or (found == FLAT and verdict == EMPTY):
                     verdict = found
@@ -284,7 +307,7 @@ def build_mesh(steps, lens, light, crossings, iris, box, coarse, limits):
         pupil, data, n_nodes = _add_nodes(lattice, pupil, data, n_nodes, forced, level, depth, ny, box)
     _trace(steps, lens, light, pupil, data, first, n_nodes)
     pupil, data = _resized(pupil, data, n_nodes, n_nodes)
-    return pupil, data, _triangulate(state, offsets, lattice, nx, ny, depth)
+    return pupil, data, _triangulate(state, offsets, lattice, nx, ny, depth), halved
 
 
 @inner

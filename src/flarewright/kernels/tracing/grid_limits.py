@@ -29,6 +29,15 @@ class GridLimits(NamedTuple):
         Radius around the axis that the picture covers, mm; inf for all.
     slivers : int
         1: slivers of light pass beside rays that end, search them; 0: there are none.
+    inner_bend : float
+        Away from the rim, largest error of positions over the size of the cell; the error in area is twice that, and
+        more would show as triangles.
+    area_ratio : float
+        Largest ratio of the areas of a cell's triangles on the sensor, less 1: the spread of its density.
+    weight_bend : float
+        Light is interpolated linearly between nodes: largest departure from that, as a part of the light.
+    fold_px, area_px : float
+        Cells whose image is smaller, pixels, may fold, and may have any ratio of areas.
     """
 
     rim_level: int
@@ -40,3 +49,8 @@ class GridLimits(NamedTuple):
     scale: float
     view_radius: float
     slivers: int
+    inner_bend: float
+    area_ratio: float
+    weight_bend: float
+    fold_px: float
+    area_px: float

@@ -25,6 +25,8 @@ MAX_LEVEL = 6
 RIM_LEVEL = 2
 # largest relative flux error from the rim
 FLUX_TOLERANCE = 3e-4
+# limits of a cell's smoothness (`kernels.tracing.grid_limits`)
+INNER_BEND, AREA_RATIO, WEIGHT_BEND, FOLD_PX, AREA_PX = 0.005, 1.0, 0.002, 2.0, 5.0
 
 
 @dataclass(frozen=True)
@@ -131,6 +133,8 @@ class Bundle:
         Nodes traced at the wavelengths that shaped the grid (`trace_points`).
     halves : int
         2: the light is the bundle plus its mirror image; 1: the bundle alone.
+    halved : ndarray, shape (10,), or None
+        Number of cells that were halved for each of `kernels.tracing.adaptive_grid.REASONS`.
     """
 
     path: LightPath
@@ -138,6 +142,7 @@ class Bundle:
     triangles: Indices
     traced: dict[int, Floats]
     halves: int = 2
+    halved: Indices | None = None
 
 
 @dataclass(frozen=True)
@@ -205,12 +210,12 @@ def trace_grid(
     cells = cells_across(packed, COARSE_GRID if fine.coarse else GRID)
     limits = GridLimits(
         rim_level, MAX_LEVEL, fine.tolerance, rim_tolerance, fine.fringe_px, fine.faint_radius, fine.scale,
-        fine.view_radius, int(region.slivers),
+        fine.view_radius, int(region.slivers), INNER_BEND, AREA_RATIO, WEIGHT_BEND, FOLD_PX, AREA_PX,
     )  # fmt: skip
-    pupil, data, triangles = build_mesh(
+    pupil, data, triangles, halved = build_mesh(
         *tracing_arguments(packed, fitted, path, tilt), path.stop_crossings, iris, region.box, cells, limits
     )
-    return Bundle(path, pupil, triangles, dict(zip(fitted, data, strict=True)), packed.halves)
+    return Bundle(path, pupil, triangles, dict(zip(fitted, data, strict=True)), packed.halves, halved)
 
 
 def trace_bundle(packed: PackedLens, w: int, bundle: Bundle, tilt: float) -> Floats:

@@ -5,10 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kernels.raster.spread import spread_taps
 from ...optics.diffraction.fft_size import fast_size
 from ...optics.pupil.polygon import END, START, WEIGHT, mapped, points
-from ...typing import Floats
+from ...typing import Floats, Pixels
 from ..image.canvas import lit_window
+
+# kernels of more taps are applied by a Fourier transform
+MOST_TAPS = 300
 
 
 def blur_by_extent(picture: NDArray[np.floating], kernel: Floats) -> Floats:
@@ -35,6 +39,41 @@ def blur_by_extent(picture: NDArray[np.floating], kernel: Floats) -> Floats:
         )
         out[..., c] = wide[reach[0] : reach[0] + height, reach[1] : reach[1] + width]
     return out
+
+
+def spread_window(picture: Pixels, kernel: Floats) -> tuple[Pixels, tuple[int, int]]:
+    """Convolve a picture that is dark outside a small window, and remove a border as wide as the kernel reaches.
+
+    Parameters
+    ----------
+    picture : ndarray, shape (H + 2 a, W + 2 b, C), float32
+    kernel : ndarray, shape (2 a + 1, 2 b + 1)
+
+    Returns
+    -------
+    light : ndarray, shape (H', W', C), float32
+        The part of the result of H x W pixels that may hold light; empty where there is none.
+    corner : tuple of int
+        Column and row of its first pixel.
+    """
+    reach = [side // 2 for side in kernel.shape]
+    height, width = picture.shape[0] - 2 * reach[0], picture.shape[1] - 2 * reach[1]
+    x0, y0, x1, y1 = lit_window(picture)
+    # the convolved window, in the result without border
+    left, top = max(x0 - 2 * reach[1], 0), max(y0 - 2 * reach[0], 0)
+    right, bottom = min(x1, width), min(y1, height)
+    if x1 <= x0 or right <= left or bottom <= top:
+        return np.zeros((0, 0, picture.shape[2]), dtype=np.float32), (0, 0)
+    window = picture[y0:y1, x0:x1]
+    if np.count_nonzero(kernel) > MOST_TAPS:
+        wide = np.pad(window, ((reach[0],) * 2, (reach[1],) * 2, (0, 0)))
+        spread = blur_by_extent(wide, kernel).astype(np.float32)
+        cut_x, cut_y = left - (x0 - 2 * reach[1]), top - (y0 - 2 * reach[0])
+        return spread[cut_y : cut_y + bottom - top, cut_x : cut_x + right - left], (left, top)
+    light = np.zeros((bottom - top, right - left, picture.shape[2]), dtype=np.float32)
+    first = top - (y0 - 2 * reach[0]), left - (x0 - 2 * reach[1])
+    spread_taps(np.ascontiguousarray(window, dtype=np.float32), kernel.astype(np.float32), *first, light)
+    return light, (left, top)
 
 
 def spread_within(picture: NDArray[np.floating], kernel: Floats) -> Floats:

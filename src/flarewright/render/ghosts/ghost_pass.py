@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise, product
+from time import thread_time
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,7 @@ from ..scene.area_lights import DRAFT_ROUNDING, halvings, motion, spread_border
 from ..scene.art_rules import PLAIN, PathArt
 from ..scene.memory_check import check_memory, spare_bytes
 from ..scene.shot import Shot
+from .cost import CostMeter
 from .final_pass import FinalPass
 from .paraxial_ghosts import (
     downsampled,
@@ -125,6 +127,7 @@ def render_ghosts(
     faintest: float = 0.0,
     threads: int | None = None,
     progress: Progress | None = None,
+    costs: CostMeter | None = None,
 ) -> GhostPass:
     """Draw the ghosts of all paths and lights.
 
@@ -146,6 +149,8 @@ def render_ghosts(
         None: all cores. The pixels do not depend on it.
     progress : callable, optional
         Called with the finished part (0 to 1) and the name of the step.
+    costs : CostMeter, optional
+        Final quality: gets the time and the work of each ghost.
 
     Returns
     -------
@@ -160,7 +165,7 @@ def render_ghosts(
             if quality.mode == "draft":
                 done = _draft(shots, paths, singles, art, pool, meter)
             else:
-                done = _final(shots, paths, quality, singles, art, (level, faintest), pool, meter)
+                done = _final(shots, paths, quality, singles, art, (level, faintest), pool, meter, costs)
             return replace(done, muted=len(given) - len(paths))
         except BaseException:
             # Ctrl-C arrives here: workers stop at their next wavelength
@@ -178,6 +183,7 @@ def _final(
     levels: tuple[float, float],
     pool: ThreadPoolExecutor,
     meter: _ProgressMeter,
+    costs: CostMeter | None = None,
 ) -> GhostPass:
     others, faintest = levels
     # separate layers need every ghost
@@ -186,7 +192,10 @@ def _final(
     def find(group: list[LightPath]) -> list[list[FinalPass]]:
         if meter.cancelled.is_set():
             return []
+        begun = thread_time()
         found = look(group)
+        if costs is not None:
+            costs.searched(thread_time() - begun)
         for _ in group:
             meter.step("searching ghosts")
         return found
@@ -223,23 +232,23 @@ def _final(
                 if item.source is not None and k not in alone:
                     continue
                 if item.region.seen_flux > 0.0 and item.art.ramps:
-                    draw_alone([item], quality, canvas, meter.cancelled, seen_in)
+                    draw_alone([item], quality, canvas, meter.cancelled, seen_in, costs=costs)
                 elif item.region.seen_flux > 0.0 and item.alone:
                     alike.setdefault(item.alone, []).append(item)
                 elif item.region.seen_flux > 0.0:
                     # a separate layer can be brightened later, so it is drawn in full detail
                     visibility = float("inf") if k in alone else edge_contrast(item, seen_level)
-                    draw_final(item, quality, canvas, visibility, meter.cancelled, seen_in)
+                    draw_final(item, quality, canvas, visibility, meter.cancelled, seen_in, costs=costs)
             meter.step(f"ghost {name_of[k]}")
         for together in alike.values():
-            draw_alone(together, quality, canvas, meter.cancelled, seen_in)
+            draw_alone(together, quality, canvas, meter.cancelled, seen_in, costs=costs)
         return canvas.planes
 
     def draw_spread(groups: list[list[FinalPass]]) -> list[Plane | None]:
         canvas = blank(shots[0].size_px)
         for group in groups:
             if not meter.cancelled.is_set():
-                draw_alone(group, quality, canvas, meter.cancelled, around, seen_level)
+                draw_alone(group, quality, canvas, meter.cancelled, around, seen_level, costs)
         return canvas.planes
 
     wide = _alike([item for k in order if k not in alone for item in found[k]], seen_level)

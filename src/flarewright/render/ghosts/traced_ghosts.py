@@ -29,13 +29,14 @@ from ...optics.rays.pupil_region import Region, find_region, measure_region, wid
 from ...optics.rays.torn_cells import cut_failed_triangles
 from ...optics.scattering.sensor_grating import GratingOrder, grating_orders
 from ...typing import Floats
-from ..image.canvas import DETAIL_CONTRAST, DETAILS, Canvas, Plane, blank, merge
+from ..image.canvas import DETAIL_CONTRAST, DETAILS, Canvas, blank, merge
 from ..scene.area_lights import NARROW_PX, halvings, motion, spread_border
 from ..scene.art_rules import PLAIN, Frame, PathArt
 from ..scene.path_color import traced_spectrum, visible_rays
 from ..scene.shot import Shot, at_fine_wavelengths
 from .art_filters import coarseness, filtered_ghost
-from .extent_blur import shape_kernel, spread_within
+from .cost import IDLE, CostMeter, Watch
+from .extent_blur import shape_kernel, spread_window
 from .final_pass import FinalPass
 from .steep_ghosts import bent_spectrum, steepness
 from .wavelength_subset import gathered_weights
@@ -190,6 +191,7 @@ def draw_final(
     stop: Event | None = None,
     around: Surroundings | None = None,
     detail: int | None = None,
+    costs: CostMeter | None = None,
 ) -> None:
     """Trace one path of one light and add it to a canvas.
 
@@ -207,7 +209,10 @@ def draw_final(
         Light around the ghost's rings; None: they are judged alone.
     detail : int, optional
         How often the canvas' resolution is halved for it; None: according to `visibility`.
+    costs : CostMeter, optional
+        Gets the time and the work of each stage.
     """
+    watch = IDLE if costs is None else costs.watch(item.path.name)
     detail = detail_of(visibility) if detail is None else detail
     shot, path = item.shot, item.path
     tilt, opening = shot.incidence.tilt, shot.opening
@@ -220,35 +225,53 @@ def draw_final(
         shot.packed, path, tilt, (opening.radius, opening.inner), item.region,
         replace(fine, one_color=few and one_color, rough=detail + rough, coarse=quality.screen),
     )  # fmt: skip
-    count = len(shot.packed.wavelengths_nm)
+    watch.built(bundle, detail)
     spectrum = traced_spectrum(shot, path, bundle, item.to_pixels)
     steep = "not" if few else steepness(shot, bundle, spectrum, item.to_pixels)
     if steep != "not":
         other = _seen_by(at_fine_wavelengths(shot), item)
         if steep == "much":
-            draw_final(replace(other, least_steps=2), quality, canvas, visibility, stop, around, detail)
+            watch.lap("colour")
+            draw_final(replace(other, least_steps=2), quality, canvas, visibility, stop, around, detail, costs)
             return
         # as fine as the drawn grid: with errors four times as large, two of 468 ghosts miss the 2 % limit
         grid = trace_grid(other.shot.packed, path, tilt, (opening.radius, opening.inner), other.region, fine)
         spectrum = bent_spectrum(shot, other.shot, grid, spectrum, item.to_pixels)
-    if few and _drawn_in_few(item, bundle, spectrum, canvas.plane(detail), to_pixels, careful=not quality.screen):
+    watch.lap("colour")
+    if few and _drawn_in_few(item, bundle, spectrum, canvas, detail, watch, careful=not quality.screen):
         return
-    rings, step_px, sharp = None, BRIDGE_PX, bundle
+    rings = None
     if visibility >= STEP_CONTRAST:
         rings = _seen_rings(item, quality, bundle, to_pixels, detail, around)
+    most = MOST_BRIDGES if visibility == float("inf") else min(MOST_BRIDGES, max(1, int(visibility / STEP_CONTRAST)))
+    _draw_in_all(item, bundle, spectrum, rings, fine, canvas, detail, most if quality.bridge else 0, stop, watch)
+
+
+def _draw_in_all(
+    item: FinalPass, sharp: Bundle, spectrum: PathSpectrum | None, rings: Rings | None, fine: Refinement,
+    canvas: Canvas, detail: int, most: int, stop: Event | None, watch: Watch,
+) -> None:  # fmt: skip
+    """Draw a ghost at all traced wavelengths, and between two of them at most `most` - 1 times; 0: not at all."""
+    shot, path, bundle, step_px = item.shot, item.path, sharp, BRIDGE_PX
+    tilt, opening, count = shot.incidence.tilt, shot.opening, len(shot.packed.wavelengths_nm)
+    to_pixels = item.to_pixels / 2.0**detail
     if rings is not None:
         if _is_soft(bundle, opening.radius):
             step_px = max(BRIDGE_PX, BRIDGE_FRINGES * rings.fringe_px)
         bundle = _with_shadow(item, rings, fine)
+        watch.built(bundle, detail)
+    watch.lap("rings")
     traced = [trace_bundle(shot.packed, w, bundle, tilt) for w in range(count)]
+    watch.traced(bundle, count)
     pieces = [1] * (count - 1)
-    if quality.bridge:
+    if most > 0:
         limit = float("inf") if rings is None else opening.radius
-        found = _bridges(traced, limit, item.view_radius, scale, visibility, step_px)
+        found = _bridges(traced, limit, item.view_radius, fine.scale / step_px, most)
         pieces = [max(n, item.least_steps) for n in found]
     steps = [(w, k / n) for w, n in enumerate(pieces) for k in range(n)] + [(count - 1, 0.0)]
     fine_nm = np.interp([w + part for w, part in steps], np.arange(count), shot.packed.wavelengths_nm)
     carried = None if spectrum is None else spectrum.carried
+    watch.lap("between")
     patterns, flux = None, None
     if rings is not None:
         # imported only where there are rings
@@ -257,6 +280,7 @@ def draw_final(
         patterns = rings.textures(fine_nm, _seen(item, rings, bundle, traced, to_pixels, canvas, detail))
         middle = steps.index((count // 2, 0.0))
         flux = ring_flux(shot, patterns, sharp, bundle, middle, to_pixels, canvas.size(detail), carried)
+        watch.lap("rings")
     for k, ((w, part), color) in enumerate(zip(steps, shot.weights(fine_nm, spectrum) * item.art.rgb, strict=True)):
         if stop is not None and stop.is_set():
             return
@@ -266,7 +290,9 @@ def draw_final(
         if part > 0.0:
             data = _between(data, traced[w + 1], part, (1.0, 1.0) if carried is None else (carried[w], carried[w + 1]))
         whole, data = cut_failed_triangles(bundle, data)
+        watch.lap("between")
         densities = node_densities(data, whole.pupil, whole.triangles)
+        watch.lap("density")
         plane = canvas.plane(detail)
         rgb = color if flux is None else color * flux.kept(k, w + part, whole, data, densities)
         for place, share in _places(item, to_pixels, w, part):
@@ -277,6 +303,7 @@ def draw_final(
                     data, whole.pupil, whole.triangles, densities, path.stop_crossings, opening.blades,
                     opening.levels, shot.incidence.axes, place, shot.gain, rgb * share, plane, whole.halves,
                 )  # fmt: skip
+            watch.drew(whole, data, shot.incidence.axes, place, canvas.size(detail))
 
 
 def _seen_by(shot: Shot, item: FinalPass) -> FinalPass:
@@ -302,23 +329,30 @@ def _places(item: FinalPass, to_pixels: Floats, w: int, part: float) -> list[tup
 
 
 def _drawn_in_few(
-    item: FinalPass, bundle: Bundle, spectrum: PathSpectrum | None, plane: Plane, to_pixels: Floats, *, careful: bool
-) -> bool:
+    item: FinalPass, bundle: Bundle, spectrum: PathSpectrum | None, canvas: Canvas, detail: int, watch: Watch, *,
+    careful: bool,
+) -> bool:  # fmt: skip
     """Draw a ghost with invisible colour steps at its grid's wavelengths only; False if these cannot stand for all."""
     shot, path, opening = item.shot, item.path, item.shot.opening
+    plane, to_pixels = canvas.plane(detail), item.to_pixels / 2.0**detail
     shown = tuple(sorted(bundle.traced))
     colors = shot.weights(shot.packed.wavelengths_nm, spectrum) * item.art.rgb
     seen = visible_rays(shot, item.to_pixels)
     weights = gathered_weights(shot.packed, bundle, shot.incidence.tilt, colors, shown, seen, careful=careful)
     if weights is None:
         return False
+    watch.lap("colour")
     for w, rgb in weights.items():
         whole, data = cut_failed_triangles(bundle, trace_bundle(shot.packed, w, bundle, shot.incidence.tilt))
+        watch.lap("between")
+        densities = node_densities(data, whole.pupil, whole.triangles)
+        watch.lap("density")
         draw_bundle(
-            data, whole.pupil, whole.triangles, node_densities(data, whole.pupil, whole.triangles),
+            data, whole.pupil, whole.triangles, densities,
             path.stop_crossings, opening.blades, opening.levels, shot.incidence.axes, to_pixels, shot.gain,
             np.ascontiguousarray(rgb), plane, whole.halves,
         )  # fmt: skip
+        watch.drew(whole, data, shot.incidence.axes, to_pixels, canvas.size(detail))
     return True
 
 
@@ -381,6 +415,7 @@ def draw_alone(
     stop: Event | None = None,
     around: Surroundings | None = None,
     level: float = 0.0,
+    costs: CostMeter | None = None,
 ) -> None:
     """Draw ghosts on a separate plane, spread, ramp and blur it, and add it to a canvas.
 
@@ -398,11 +433,13 @@ def draw_alone(
         As in `draw_final`.
     level : float
         Mean irradiance of all ghosts in the picture, for `edge_contrast`; 0: draw these in full detail.
+    costs : CostMeter, optional
+        As in `draw_final`.
     """
     art, shot, frame, source = items[0].art, items[0].shot, items[0].frame, items[0].source
     detail = max(items[0].detail, coarseness(art, shot.to_pixels) if art.blur > 0.0 else 0)
     own = shot.to_pixels / 2.0**detail
-    mx, my = art.margin(own)
+    mx, my = art_margin = art.margin(own)
     kernel = None if source is None else shape_kernel(source, 0.5**detail)
     if kernel is not None:
         mx, my = mx + kernel.shape[1] // 2, my + kernel.shape[0] // 2
@@ -413,26 +450,32 @@ def draw_alone(
     for item in items:
         shifted = item.to_pixels / 2.0**detail + np.array([mx, my, 0.0, 0.0])
         own_item = replace(item, to_pixels=shifted, source=small)
-        draw_final(own_item, quality, sheet, edge_contrast(item, level), stop=stop, around=beside, detail=0)
-    pixels = merge(sheet.planes, sheet.size_px)
+        visible = edge_contrast(item, level)
+        draw_final(own_item, quality, sheet, visible, stop=stop, around=beside, detail=0, costs=costs)
+    # separate planes hold blocks of float32
+    pixels, corner = merge(sheet.planes, sheet.size_px).astype(np.float32, copy=False), (0, 0)
     if kernel is not None:
-        pixels = spread_within(pixels, kernel)
+        pixels, corner = spread_window(pixels, kernel)
     if not art.alone:
-        canvas.add(pixels, detail)
+        canvas.add(pixels, detail, corner)
         return
+    if kernel is not None:
+        # filters take the picture with its margin
+        whole = np.zeros((height + 2 * art_margin[1], width + 2 * art_margin[0], 3), dtype=np.float32)
+        whole[corner[1] : corner[1] + pixels.shape[0], corner[0] : corner[0] + pixels.shape[1]] = pixels
+        pixels = whole
     canvas.add(filtered_ghost(pixels, art, frame, items[0].to_pixels / 2.0**detail, own), detail)
 
 
 def _bridges(
-    traced: list[Floats], iris_radius: float, view_radius: float, scale: float, visibility: float, step_px: float
-) -> list[int]:
+    traced: list[Floats], iris_radius: float, view_radius: float, steps_per_mm: float, most: int
+) -> list[int]:  # fmt: skip
     """Return the number of steps in each gap between traced wavelengths so that no colour step is visible."""
-    most = min(MOST_BRIDGES, max(1, int(visibility / STEP_CONTRAST))) if visibility < float("inf") else MOST_BRIDGES
     if most == 1:
         return [1] * (len(traced) - 1)
     # use a quantile: the nodes that move farthest carry hardly any light
     gaps = [shift_quantile(short, long, iris_radius, view_radius, SHIFT_QUANTILE) for short, long in pairwise(traced)]
-    return [min(max(ceil(gap * scale / step_px), 1), most) for gap in gaps]
+    return [min(max(ceil(gap * steps_per_mm), 1), most) for gap in gaps]
 
 
 def _between(short: Floats, long: Floats, part: float, carried: tuple[float, float] = (1.0, 1.0)) -> Floats:

@@ -49,13 +49,25 @@ class Canvas:
             plane = self.planes[detail] = blank_plane(*self.size(detail))
         return plane
 
-    def add(self, pixels: Plane, detail: int = 0) -> None:
-        """Add a picture of shape (H, W, 3), flux per pixel, whose resolution is halved `detail` times."""
-        plane = self.plane(detail)
-        height, blocks = plane.shape[:2]
-        padded = np.zeros((height, blocks * BLOCK, 3))
-        padded[:, : pixels.shape[1]] = pixels
-        plane += np.moveaxis(padded.reshape(height, blocks, BLOCK, 3), 3, 2)
+    def add(self, pixels: Plane, detail: int = 0, corner: tuple[int, int] = (0, 0)) -> None:
+        """Add a picture, flux per pixel, to the plane whose resolution is halved `detail` times.
+
+        Parameters
+        ----------
+        pixels : ndarray, shape (H, W, 3)
+            Lies within the plane.
+        detail : int
+        corner : tuple of int
+            Column and row of its first pixel.
+        """
+        (x, y), (height, width) = corner, pixels.shape[:2]
+        if not pixels.size:
+            return
+        first, last = x // BLOCK, -(-(x + width) // BLOCK)
+        padded = np.zeros((height, (last - first) * BLOCK, 3), dtype=pixels.dtype)
+        padded[:, x - first * BLOCK : x - first * BLOCK + width] = pixels
+        window = self.plane(detail)[y : y + height, first:last]
+        window += np.moveaxis(padded.reshape(height, last - first, BLOCK, 3), 3, 2)
 
 
 def merge(planes: Sequence[Plane | None], size_px: tuple[int, int]) -> Plane:

@@ -79,6 +79,9 @@ class OutputOptions:
         False
     )
     ledger: Annotated[bool, typer.Option("--ledger", help="Print where the light went.", rich_help_panel=PANEL)] = False
+    profile: Annotated[
+        bool, typer.Option("--profile", help="Print what each ghost costs to draw.", rich_help_panel=PANEL)
+    ] = False
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a summary as one JSON object.", rich_help_panel=PANEL)
     ] = False
