@@ -1,6 +1,6 @@
 """Benchmarks of tracing, rasterization, whole frames, start-up and memory.
 
-    python -m benchmarks [--json FILE] [--repeat N] [--only PART ...]
+    python -m benchmarks [--json FILE] [--repeat N] [--only PART ...] [--baseline FILE]
 
 Every number is the median of repeated runs. Machines differ, so each kernel also has a ratio to a yardstick measured in
 the same run: a copy of memory for the raster, a plain scalar tracer for the trace. The benchmarks are not part of the
@@ -30,6 +30,7 @@ import numpy as np
 from benchmarks.design import design
 from benchmarks.lights import area, lights, surfaces
 from benchmarks.passes import passes
+from benchmarks.suite import SIZES, suite
 
 import flarewright
 from flarewright.kernels.raster.polygons import blank_plane, fill_polygon
@@ -63,7 +64,7 @@ from flarewright.render.scene.shots import make_shots
 
 PARTS = (
     "yardsticks", "trace", "raster", "frame", "passes", "art", "built", "lights", "area", "surfaces", "scatter",
-    "ringing", "reference", "design", "residual", "startup", "memory",
+    "ringing", "reference", "design", "residual", "startup", "memory", "suite",
 )  # fmt: skip
 
 LIGHT = (10.0, 5.0)
@@ -469,7 +470,20 @@ def show(rows: Rows) -> None:
             part = r["part"]
             print(f"\n{part}")
         ratio = f"  {r['ratio']:6.2f} x {r['against']}" if r["ratio"] is not None else ""
-        print(f"  {r['name']:<{width}}  {r['value']:10.4g} {r['unit']}{ratio}")
+        before = r.get("before")
+        change = "" if not before else f"  {(r['ratio'] or r['value']) / before:5.2f} of before"
+        print(f"  {r['name']:<{width}}  {r['value']:10.4g} {r['unit']}{ratio}{change}")
+
+
+def _before(now: dict[str, Any], rows: Rows) -> float | None:
+    """Return the ratio of the same row of an earlier run, or its value where it has no ratio."""
+    same = [r for r in rows if (r["part"], r["name"], r["against"]) == (now["part"], now["name"], now["against"])]
+    return next((r["ratio"] or r["value"] for r in same), None)
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, height = text.split("x")
+    return int(width), int(height)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -477,7 +491,12 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Flarewright's benchmarks.")
     parser.add_argument("--json", metavar="FILE", help="write the numbers to this file")
     parser.add_argument("--repeat", type=int, default=5, help="runs per number; the median is printed (default: 5)")
-    parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS, help="parts to run (default: all)")
+    parser.add_argument(
+        "--only", nargs="+", choices=PARTS, default=PARTS[:-1], help="parts to run (default: all but the long suite)"
+    )
+    parser.add_argument("--lens", nargs="+", default=[], metavar="FILE", help="more lenses for the suite")
+    parser.add_argument("--size", nargs="+", type=_size, default=SIZES, metavar="WxH", help="frames of the suite")
+    parser.add_argument("--baseline", metavar="FILE", help="numbers of an earlier --json to print beside these")
     given = parser.parse_args(arguments)
     machine = facts()
     print("  ".join(f"{key} {value}" for key, value in machine.items()))
@@ -500,10 +519,14 @@ def main(arguments: list[str] | None = None) -> None:
         "residual": residual,
         "startup": lambda: startup(given.repeat),
         "memory": memory,
+        "suite": lambda: suite(row, scalar, given.repeat, given.lens, given.size),
     }
     for part in PARTS:
         if part in given.only:
             rows += parts[part]()
+    if given.baseline:
+        before = json.loads(Path(given.baseline).read_text(encoding="utf-8"))["results"]
+        rows = [{**r, "before": _before(r, before)} for r in rows]
     show(rows)
     if given.json:
         Path(given.json).write_text(
