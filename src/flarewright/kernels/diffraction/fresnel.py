@@ -6,6 +6,7 @@ from math import pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...typing import Pixels
 from ..jit.decorators import compiled
@@ -139,7 +140,7 @@ class PhaseTables(NamedTuple):
         Steps per f^2 times the area.
     """
 
-    turns: Pixels
+    turns: NDArray[np.complex64]
     fades: Pixels
     to_step: float
 
