@@ -14,6 +14,7 @@ import numpy as np
 
 from ...typing import Floats, Pixels
 from ..core.binning import binned
+from ..core.robust import MAD_TO_SIGMA
 from .settings import GeometrySettings
 
 Band = Pixels
@@ -127,7 +128,7 @@ def axis_beside_path(
     values, errors, arms = np.array(found).T
     # limit the influence of a bad frame, such as one with a ghost that the border cuts
     typical = float(np.median(values))
-    scatter = max(1.4826 * float(np.median(np.abs(values - typical))), 0.02)
+    scatter = max(MAD_TO_SIGMA * float(np.median(np.abs(values - typical))), 0.02)
     kept = np.abs(values - typical) < 4.0 * np.maximum(scatter, errors)
     # asymmetry turns the line by some angle, so the weight of a frame grows with the distance of its light
     weight = (arms[kept] / arms[kept].max()) ** 2 / (errors[kept] ** 2 + scatter**2)
