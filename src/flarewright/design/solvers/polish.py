@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...kernels.design.arguments import Effort, LensStructure, SearchSpace
+from ...kernels.design.arguments import Effort, FreeVariables, LensStructure
 from ...kernels.design.local_search import polish_many
 from ...kernels.design.picture_search import polish_by_picture
 from ...model.project.design import Bounds
@@ -84,7 +84,7 @@ def polish_within(
     """
     ends, costs = np.empty_like(points), np.empty(len(points))
     lens = LensStructure(known.structure.stop, known.structure.mirrors, aim.entrance)
-    space = SearchSpace(known.low, known.high, known.free, known.longest)
+    space = FreeVariables(known.low, known.high, known.free, known.longest)
     if aim.picture is not None:
         polish_by_picture(
             points, lens, space, aim.slopes, aim.limits, aim.picture.for_kernels, steps, worth, ends, costs

@@ -29,7 +29,7 @@ class LensStructure(NamedTuple):
     entrance: float
 
 
-class SearchSpace(NamedTuple):
+class FreeVariables(NamedTuple):
     """The variables of a local search.
 
     Attributes

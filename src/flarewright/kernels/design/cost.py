@@ -5,7 +5,7 @@ import numpy as np
 from ..jit.decorators import compiled, inner
 from .assignment import assign
 from .ghosts import PLACE, RADIUS, REACH, light_values
-from .vignetting import beyond
+from .vignetting import beyond_sight
 
 # columns of targets and of weights: place on the line (mm), signed radius (mm), log irradiance
 T_PLACE, T_RADIUS, T_LIGHT = 0, 1, 2
@@ -61,7 +61,7 @@ def misfit(t, g, slope, aims, values, light):
     radius = values[g, RADIUS] if aims.signed else abs(values[g, RADIUS])
     place = weights[t, T_PLACE] * (values[g, PLACE] * slope - targets[t, T_PLACE])
     size = weights[t, T_RADIUS] * (radius - targets[t, T_RADIUS])
-    hidden = hidden_weight(t, targets, weights) * beyond(g, slope, values)
+    hidden = hidden_weight(t, targets, weights) * beyond_sight(g, slope, values)
     total = place * place + size * size + hidden * hidden
     if weights[t, T_LIGHT] > 0.0:
         bright = weights[t, T_LIGHT] * (light[g] - targets[t, T_LIGHT])
@@ -80,7 +80,7 @@ def fill_costs(ghosts, s, aims, values, light, parts, cost):
     for g in range(ghosts):
         parts[0, g] = values[g, PLACE] * slope
         parts[1, g] = values[g, RADIUS] if aims.signed else abs(values[g, RADIUS])
-        parts[2, g] = beyond(g, slope, values) ** 2
+        parts[2, g] = beyond_sight(g, slope, values) ** 2
         parts[3, g] = extra_cost(g, slope, values, aims.extra)
     for t in range(first, last):
         place, radius = targets[t, T_PLACE], targets[t, T_RADIUS]

@@ -24,7 +24,7 @@ from .ghosts import (
     list_ghosts,
     reduce_rows,
 )
-from .vignetting import beyond, fill_mirrors_of_ghosts, sight_row
+from .vignetting import beyond_sight, fill_mirrors_of_ghosts, sight_row
 
 # rows of the lens' limits: least and largest value, and weight, of 1/efl (1/mm), 1/f-number and
 # length from the first vertex to the last (mm). A further row holds the least edge (mm), the steepest surface and the
@@ -147,7 +147,7 @@ def fill_system(q, lens, aims, ghosts, found, matching, between, limits, missed,
                 w = weights[t, T_LIGHT]
                 _row(system, w * (light[g] - targets[t, T_LIGHT]), m, w, found.light_by[g], free, scale)
                 m += 1
-            away, w = beyond(g, slopes[s], values), hidden_weight(t, targets, weights)
+            away, w = beyond_sight(g, slopes[s], values), hidden_weight(t, targets, weights)
             if away > 0.0 and w > 0.0:
                 sight_row(q, lens.mirrors.size, lens.stop, between[g, 0], between[g, 1], lens.entrance, room.work,
                           room.trail, room.partial, row)  # fmt: skip
@@ -206,7 +206,7 @@ def _limit_row(q, rows, stop, limit, room, row):
 
 
 @inner
-def normal_equations(system, count, unknowns, normal):
+def fill_normal_equations(system, count, unknowns, normal):
     """Fill the lower triangle of J'J and, as last row, J'r; sum four rows at a time to keep the sums in registers."""
     for a in range(unknowns + 1):
         for b in range(a + 1):
@@ -300,7 +300,7 @@ def fill_ghosts(q, lens, lit, work, found):
 
 
 @inner
-def differentiate(q, lens, lit, room, found):
+def fill_derivatives(q, lens, lit, room, found):
     """Fill the ghosts of a prescription and their derivatives, those of their brightness if any target has one."""
     rows, stop, mirrors = lens.mirrors.size, lens.stop, lens.mirrors
     differentiate_ghosts(q, rows, stop, mirrors, lens.entrance, lit, room.work, room.trail, room.partial, room.common,
@@ -318,7 +318,7 @@ def polish_many(starts, lens, space, aims, limits, effort, ends, costs, matches)
     starts : ndarray, shape (B, 1 + 3 K), float64
         Search variables: log stop diameter, log thicknesses, curvatures, indices.
     lens : LensStructure
-    space : SearchSpace
+    space : FreeVariables
     aims : GhostAims
     limits : ndarray, shape (LIMITS + 1, 3)
         Least, largest and weight of 1/efl, 1/f-number and length; least edge, steepest surface and their weight.
@@ -364,11 +364,11 @@ def polish_many(starts, lens, space, aims, limits, effort, ends, costs, matches)
         damping, pause, since = 1e-2, effort.patience, 0
         for _ in range(effort.steps):
             to_prescription(x, logs, q)
-            differentiate(q, lens, lit, room, found)
+            fill_derivatives(q, lens, lit, room, found)
             fill_scale(q, free, logs, scale)
             filled = fill_system(q, lens, aims, most, found, matching, between, limits, missed, free, scale, room,
                                  system)  # fmt: skip
-            normal_equations(system, filled, unknowns, normal)
+            fill_normal_equations(system, filled, unknowns, normal)
             hold_at_bounds(normal[unknowns], x, free, low, high, held)
             better = cost
             for _ in range(8):

@@ -22,11 +22,11 @@ from .local_search import (
     clip_start,
     damped_step,
     fill_limit_rows,
+    fill_normal_equations,
     fill_scale,
     ghosts_of_structure,
     hold_at_bounds,
     limit_values,
-    normal_equations,
     step_within,
     to_prescription,
 )
@@ -254,7 +254,7 @@ def polish_by_picture(starts, lens, space, slopes, limits, picture, steps, worth
     starts : ndarray, shape (B, 1 + 3 K), float64
         Search variables, as in `kernels.design.local_search.polish_many`.
     lens : LensStructure
-    space : SearchSpace
+    space : FreeVariables
     slopes : ndarray, shape (L,)
         Slope of each light.
     limits
@@ -307,7 +307,7 @@ def polish_by_picture(starts, lens, space, slopes, limits, picture, steps, worth
             fill_scale(q, free, logs, scale)
             filled = fill_picture_rows(values, jacobian, slopes, picture.unit, by, free, scale, push, system)
             filled = fill_limit_rows(q, lens, limits, missed, free, scale, room, system, filled)
-            normal_equations(system, filled, unknowns, normal)
+            fill_normal_equations(system, filled, unknowns, normal)
             for v in range(unknowns):
                 normal[unknowns, v] += push[v]
             hold_at_bounds(normal[unknowns], x, free, low, high, held)

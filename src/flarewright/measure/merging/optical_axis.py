@@ -63,7 +63,7 @@ def reduced_frame(
     return Reduced(mean(radiance), mean(variance) / (3 * block**2), (light_px[0] / block, light_px[1] / block), block)
 
 
-def star_of(frames: Sequence[Reduced]) -> tuple[Floats, tuple[int, int]]:
+def aligned_star(frames: Sequence[Reduced]) -> tuple[Floats, tuple[int, int]]:
     """Return the light that moves with the light source: a low quantile of the frames aligned at the light.
 
     Parameters
@@ -113,7 +113,7 @@ def axis_beside_path(
     """
     if len(frames) < 3:
         return None
-    star, middle = star_of(frames)
+    star, middle = aligned_star(frames)
     block = frames[0].block
     reach = max(settings.axis_reach * frames[0].light.shape[1], 4.0)
     offsets = np.arange(-reach, reach + 0.5 * settings.axis_step_px, settings.axis_step_px)

@@ -32,7 +32,7 @@ _DERIVED = np.array([0, *range(FIRST_G, FIRST_I)], dtype=np.int64)
 _ROOM = ScratchBuffer()
 
 
-def halvings(width: int, settings: FrameFitSettings = FrameFitSettings()) -> int:
+def frame_halvings(width: int, settings: FrameFitSettings = FrameFitSettings()) -> int:
     """Return the number of halvings of pictures of this width for `measure_together`."""
     times = 0
     while width > settings.width_px * 2**times:
