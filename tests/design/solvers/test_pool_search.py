@@ -16,6 +16,7 @@ from flarewright.design.solvers.polish import polish, polish_within
 from flarewright.design.solvers.pool_search import PoolState, advance, neighbour, propose, solve
 from flarewright.design.solvers.search_state import read_state, write_state
 from flarewright.errors import FlarewrightError, ProjectError
+from flarewright.kernels.design.arguments import Effort, FreeVariables, GhostAims, LensStructure
 from flarewright.kernels.design.ghosts import RADIUS, REACH, REACH_THESIS
 from flarewright.kernels.design.local_search import polish_many
 from flarewright.model import Design, GhostTarget, Light, Project
@@ -90,10 +91,10 @@ def test_the_cost_is_that_of_the_objective(entrance, steps, some_hidden):
     ends, costs = np.empty_like(start), np.empty(1)
     matches = np.empty((1, len(aim.targets)), np.int64)
     limits = aim.limits * [1.0, 1.0, 0.0]
-    polish_many(
-        start, structure.stop, structure.mirrors, aim.entrance, known.low, known.high, known.free, known.longest,
-        aim.slopes, aim.spans, aim.targets, aim.weights, True, 0.0, limits, steps, 4, 0.0, ends, costs, matches,
-    )  # fmt: skip
+    lens = LensStructure(structure.stop, structure.mirrors, aim.entrance)
+    space = FreeVariables(known.low, known.high, known.free, known.longest)
+    aims = GhostAims(aim.slopes, aim.spans, aim.targets, aim.weights, True, 0.0)
+    polish_many(start, lens, space, aims, limits, Effort(steps, 4, 0.0), ends, costs, matches)
     values = evaluate(structure, known.prescription(ends), aim.entrance)[0][matches[0]]
     place = aim.weights[:, 0] * (values[:, 0] * aim.slopes[0] - aim.targets[:, 0])
     size = aim.weights[:, 1] * (values[:, 1] - aim.targets[:, 1])

@@ -16,7 +16,7 @@ from flarewright.measure.compression.prune import (
     compact_model,
     count_parameters,
     curves_of,
-    fitted_numbers,
+    fitted_in_model,
     held_error,
     rounded_to_error,
     written_numbers,
@@ -31,7 +31,7 @@ from flarewright.measure.fitting.patches import patches_of
 from flarewright.measure.glow.laws import offsets
 from flarewright.measure.replay.model_image import replay_model
 from flarewright.measure.tracking.follow import follow
-from flarewright.measure.tracking.frame_fit import halvings, measure_together
+from flarewright.measure.tracking.frame_fit import frame_halvings, measure_together
 from flarewright.measure.tracking.smoothing_spline import smooth_curve
 from flarewright.model.measurement.ghost_model import AberrationGhost, Curves, GhostModel
 
@@ -75,11 +75,11 @@ def test_stored_uncertainty_marks_the_fitted_parameters(extra):
     uncertainty[free] = 0.1
     channel = channel_of(numbers, 2, uncertainty)
     ghost = AberrationGhost(name="1", red=channel, green=channel, blue=channel, visible_deg=(0.0, 9.0))
-    assert np.array_equal(fitted_numbers(ghost), free)
+    assert np.array_equal(fitted_in_model(ghost), free)
     # without stored uncertainty, all count as fitted
     bare = channel.replace(uncertainty=())
     untold = AberrationGhost(name="1", red=bare, green=bare, blue=bare, visible_deg=(0.0, 9.0))
-    assert np.array_equal(fitted_numbers(untold), free_numbers(2, 2, 2))
+    assert np.array_equal(fitted_in_model(untold), free_numbers(2, 2, 2))
 
 
 def fitted(seed=0):
@@ -200,7 +200,7 @@ def test_a_rim_of_undetermined_size_stays_a_rim():
 
 
 def test_wide_pictures_are_halved_and_shifts_reported_in_full_pixels():
-    assert [halvings(width) for width in (240, 241, 480, 720)] == [0, 1, 1, 2]
+    assert [frame_halvings(width) for width in (240, 241, 480, 720)] == [0, 1, 1, 2]
     ghost = rescaled(shape(-50.0, 20.0, 1.0), 2.0)
     pose = Pose(1.3, 4.0, 1.0)
     seen = []

@@ -11,7 +11,7 @@ from flarewright.measure.core.parameter_vector import Floats
 from flarewright.measure.core.parameters import Shape, free_numbers
 from flarewright.measure.fitting.alternating_fit import fit_all
 from flarewright.measure.fitting.colour_prior import expectation, nothing, ties
-from flarewright.measure.fitting.detected_ghost import DetectedGhost, leading, noise_of
+from flarewright.measure.fitting.detected_ghost import DetectedGhost, channel_noise, leading
 from flarewright.measure.fitting.ghost_fit import priors, refine, render
 from flarewright.measure.fitting.patches import patches_of
 from flarewright.measure.fitting.settings import FitSettings
@@ -106,16 +106,16 @@ def test_clear_data_override_the_prior():
 def test_the_leading_colour_has_the_highest_signal_to_noise_ratio():
     ghost = DetectedGhost((moved(TRUE, light=0.4), TRUE, moved(TRUE, light=2.0)), 0, 3)
     seen = views((TRUE,), angles=[3.0, 6.0, 9.0])
-    assert leading(ghost, noise_of(seen)) == 2
+    assert leading(ghost, channel_noise(seen)) == 2
     noisy = []
     for view in seen:
         variance = view.variance.copy()
         variance[..., 2] *= 100.0
         noisy.append(replace(view, variance=variance))
-    assert noise_of(noisy)[2] == pytest.approx(10.0 * noise_of(seen)[2])
-    assert leading(ghost, noise_of(noisy)) == 1
+    assert channel_noise(noisy)[2] == pytest.approx(10.0 * channel_noise(seen)[2])
+    assert leading(ghost, channel_noise(noisy)) == 1
     dark = moved(TRUE, light=0.0)
-    assert leading(DetectedGhost((dark, dark, dark), 0, 3), noise_of(seen)) == 1
+    assert leading(DetectedGhost((dark, dark, dark), 0, 3), channel_noise(seen)) == 1
 
 
 def test_settle_recovers_all_colours():

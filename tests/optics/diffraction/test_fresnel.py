@@ -126,7 +126,7 @@ def test_a_grid_as_fine_as_pixels_show_holds_what_pixels_see():
         row /= row[np.abs(at) < 0.7].mean() / expected[np.abs(at) < 0.7].mean()
         seen = np.abs(at) < 1.5 + 3.0 * scale
         assert math.sqrt(np.mean((row - expected)[seen] ** 2)) < 0.008
-        # a step there would miss the rings by far more
+        # a step there misses the rings by several times that
         step = np.clip((1.5 - np.abs(at)) / (4.0 * grid.steps[0]) + 0.5, 0.0, 1.0)
         assert math.sqrt(np.mean((step - expected)[seen] ** 2)) > 0.035
 

@@ -76,7 +76,7 @@ def test_paths_that_turn_back_earlier_come_later(shot_and_paths):
 
 
 def test_one_colour_of_a_region_holds_all_light_of_it(shot_and_paths):
-    """As it is looked for on the whole front, and around that of a light beside."""
+    """Searched on the whole front, and around the region of a light beside."""
     shot, paths = shot_and_paths
     packed, tilt, radius = shot.packed, shot.incidence.tilt, shot.opening.radius
     x0, x1, y0, y1 = front_box(packed, tilt)

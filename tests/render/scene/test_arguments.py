@@ -16,7 +16,7 @@ WORDS = [
     "quarter-wave:550+10", "film:1.38:96.4", "stack:1.38:96.4,2.1:120", *STANDARD_NAMES, "one.toml", "rows.toml",
 ]  # fmt: skip
 WRONG = [
-    "early", "erly-multicoat", "quarter-wave", "quarter-wave:5", "film:9:96.4", "preset:", "preset:nobody", "gone.toml",
+    "early", "erly-multicoat", "quarter-wave", "quarter-wave:5", "film:9:96.4", "preset:", "preset:other", "gone.toml",
     "bad.toml",
 ]  # fmt: skip
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flarewright.kernels.diffraction.resample import blend_blade_wings
+from flarewright.kernels.diffraction.resample import SpikeTables, blend_blade_wings
 from flarewright.model import D65, Art, Camera, Iris, Light, Output, Project, Quality, Rule
 from flarewright.optics.colour.spectrum import band_weights
 from flarewright.optics.diffraction.fraunhofer import BladeWings, FanWings, pupil_pattern, spike_profile
@@ -295,10 +295,8 @@ def test_a_pixel_in_the_very_middle_of_a_spike_holds_a_number():
     out = np.zeros((1, 3, 1), np.float32)
     table = np.linspace(0.0, 1.0, 9)[None, :, None]
     one = np.ones(1)
-    blend_blade_wings(
-        np.array([-1.0, 1.0, 2.0]), np.zeros(1), np.full(2, 0.1), np.zeros(1), 0.0, table, np.full_like(table, 1.0),
-        one, one, 0.125, 1.0, 0.1, 0.2, out,
-    )  # fmt: skip
+    spikes = SpikeTables(np.zeros(1), 0.0, table, np.full_like(table, 1.0), one, one, 0.125, 1.0)
+    blend_blade_wings(np.array([-1.0, 1.0, 2.0]), np.zeros(1), np.full(2, 0.1), spikes, 0.1, 0.2, out)
     assert np.isfinite(out).all()
     assert (out > 0.0).all()
 

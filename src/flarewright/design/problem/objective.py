@@ -8,6 +8,7 @@ from math import sqrt
 import numpy as np
 
 from ...kernels.design import ghosts as columns
+from ...kernels.design.arguments import GhostAims
 from ...kernels.design.assignment import match
 from ...kernels.design.cost import irradiance_of_ghosts
 from ...kernels.design.fitness import HIDDEN, sorted_misfit
@@ -66,6 +67,13 @@ class Objective:
     names: tuple[str, ...]
     extra_part: float = 1.0
     picture: TargetCanvas | None = None
+
+    @property
+    def for_kernels(self) -> GhostAims:
+        """The target ghosts as the searches take them."""
+        return GhostAims(
+            self.slopes, self.spans, self.targets, self.weights, self.signed, self.extra * self.extra_part
+        )  # fmt: skip
 
     @property
     def wanted(self) -> int:

@@ -8,6 +8,7 @@ from math import hypot
 
 import numpy as np
 
+from ...kernels.design.arguments import TargetPicture
 from ...kernels.design.picture_search import AREA, DISTANCE, ROUND, draw_picture
 from ...typing import Floats, Indices, Mask
 
@@ -34,7 +35,7 @@ class TargetCanvas:
     start, pixel : float
         mm.
     wanted : ndarray, shape (L, V, U)
-        As documented in the kernel.
+        As in `kernels.design.arguments.TargetPicture`.
     fine : TargetCanvas or None
         The same at a higher resolution.
     """
@@ -48,6 +49,13 @@ class TargetCanvas:
     pixel: float
     wanted: Floats
     fine: TargetCanvas | None = None
+
+    @property
+    def for_kernels(self) -> TargetPicture:
+        """The pictures as the search takes them."""
+        return TargetPicture(
+            self.light, self.unit, self.edges, self.rows, self.limits, self.start, self.pixel, self.wanted
+        )
 
 
 def canvas(

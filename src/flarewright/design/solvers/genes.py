@@ -9,6 +9,7 @@ import numpy as np
 
 from ...errors import ProjectError
 from ...kernels.design import fitness as kernel
+from ...kernels.design.arguments import GeneCode
 from ...typing import Floats, Indices
 from ..problem.prescription import Structure
 from ..problem.problem import LensCandidate, Problem
@@ -51,13 +52,16 @@ class Genes:
         """Number of genes, the size of the decision vector in the thesis."""
         return len(self.places)
 
+    @property
+    def _code(self) -> GeneCode:
+        return GeneCode(self.stops, self.pattern, self.places, self.low, self.high)
+
     def fitness(self, genes: Floats) -> Floats:
         """Compute the fitness of many points, shape (B, D): shape (B,)."""
         aim, out = self.problem.objective, np.empty(len(genes))
         kernel.fitness_of_genes(
-            np.ascontiguousarray(genes), self.stops, self.pattern, self.places, self.low, self.high,
-            _KINDS[self.measure], aim.entrance, aim.slopes, aim.spans, aim.targets, aim.weights, aim.signed,
-            aim.extra * aim.extra_part, aim.limits, out,
+            np.ascontiguousarray(genes), self._code, _KINDS[self.measure], aim.entrance, aim.for_kernels, aim.limits,
+            out,
         )  # fmt: skip
         return out
 
@@ -66,9 +70,7 @@ class Genes:
         size = self.low.shape[1]
         xs, stops = np.empty((len(genes), size)), np.empty(len(genes), np.int64)
         glass = np.empty((len(genes), len(self.pattern)), np.bool_)
-        kernel.decode_many(
-            np.ascontiguousarray(genes), self.stops, self.pattern, self.places, self.low, self.high, xs, stops, glass
-        )
+        kernel.decode_many(np.ascontiguousarray(genes), self._code, xs, stops, glass)
         return tuple(
             LensCandidate(float(cost), Structure(int(stop), tuple(bool(one) for one in gaps)), x)
             for cost, stop, gaps, x in zip(costs, stops, glass, xs, strict=True)

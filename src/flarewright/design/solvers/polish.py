@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ...kernels.design.arguments import Effort, FreeVariables, LensStructure
 from ...kernels.design.local_search import polish_many
 from ...kernels.design.picture_search import polish_by_picture
 from ...model.project.design import Bounds
@@ -21,6 +22,8 @@ from ..problem.variables import Variables
 # largest number of steps of a local search, and the cost at which it stops
 STEPS = 60
 ENOUGH = 1e-18
+# number of steps before ghosts are first rematched
+_PATIENCE = 4
 
 
 def polish(
@@ -79,22 +82,17 @@ def polish_within(
     ends : ndarray, shape (B, 1 + 3 K)
     costs : ndarray, shape (B,)
     """
-    structure = known.structure
     ends, costs = np.empty_like(points), np.empty(len(points))
-    picture = aim.picture
-    if picture is not None:
+    lens = LensStructure(known.structure.stop, known.structure.mirrors, aim.entrance)
+    space = FreeVariables(known.low, known.high, known.free, known.longest)
+    if aim.picture is not None:
         polish_by_picture(
-            points, structure.stop, structure.mirrors, aim.entrance, known.low, known.high, known.free, known.longest,
-            aim.slopes, aim.limits, picture.light, picture.unit, picture.edges, picture.rows, picture.limits,
-            picture.start, picture.pixel, picture.wanted, steps, worth, ends, costs,
-        )  # fmt: skip
+            points, lens, space, aim.slopes, aim.limits, aim.picture.for_kernels, steps, worth, ends, costs
+        )
         return ends, costs
     matches = np.empty((len(points), len(aim.targets)), np.int64)
-    polish_many(
-        points, structure.stop, structure.mirrors, aim.entrance, known.low, known.high, known.free, known.longest,
-        aim.slopes, aim.spans, aim.targets, aim.weights, aim.signed, aim.extra * aim.extra_part, aim.limits,
-        steps, 4, ENOUGH, ends, costs, matches,
-    )  # fmt: skip
+    effort = Effort(steps, _PATIENCE, ENOUGH)
+    polish_many(points, lens, space, aim.for_kernels, aim.limits, effort, ends, costs, matches)
     return ends, costs
 
 

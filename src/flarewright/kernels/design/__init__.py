@@ -7,5 +7,7 @@
 - `edge_thickness`: gaps at the edge of the axial beam: `beam_of`
 - `local_search`: `polish_many`, Levenberg-Marquardt on ghost targets; `limit_excess`
 - `picture_search`: `polish_by_picture`, damped Gauss-Newton on pictures; `draw_picture`
+- `arguments`: named tuples that the searches take: `LensStructure`, `FreeVariables`, `GhostAims`, `Effort`,
+  `TargetPicture`, `GeneCode`
 - `fitness`: `fitness_of_genes`, `decode_many`, `sorted_misfit`, for general-purpose solvers
 """

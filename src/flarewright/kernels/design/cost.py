@@ -5,7 +5,7 @@ import numpy as np
 from ..jit.decorators import compiled, inner
 from .assignment import assign
 from .ghosts import PLACE, RADIUS, REACH, light_values
-from .vignetting import beyond
+from .vignetting import beyond_sight
 
 # columns of targets and of weights: place on the line (mm), signed radius (mm), log irradiance
 T_PLACE, T_RADIUS, T_LIGHT = 0, 1, 2
@@ -55,12 +55,13 @@ def extra_cost(g, slope, values, extra):
 
 
 @inner
-def misfit(t, g, slope, signed, targets, weights, values, light):
+def misfit(t, g, slope, aims, values, light):
     """Return the squared misfit of one ghost to one target."""
-    radius = values[g, RADIUS] if signed else abs(values[g, RADIUS])
+    targets, weights = aims.targets, aims.weights
+    radius = values[g, RADIUS] if aims.signed else abs(values[g, RADIUS])
     place = weights[t, T_PLACE] * (values[g, PLACE] * slope - targets[t, T_PLACE])
     size = weights[t, T_RADIUS] * (radius - targets[t, T_RADIUS])
-    hidden = hidden_weight(t, targets, weights) * beyond(g, slope, values)
+    hidden = hidden_weight(t, targets, weights) * beyond_sight(g, slope, values)
     total = place * place + size * size + hidden * hidden
     if weights[t, T_LIGHT] > 0.0:
         bright = weights[t, T_LIGHT] * (light[g] - targets[t, T_LIGHT])
@@ -69,16 +70,18 @@ def misfit(t, g, slope, signed, targets, weights, values, light):
 
 
 @inner
-def fill_costs(ghosts, first, last, slope, signed, targets, weights, values, light, extra, parts, cost):
-    """Fill the cost of each ghost for each target of one light, minus its cost as an extra ghost.
+def fill_costs(ghosts, s, aims, values, light, parts, cost):
+    """Fill the cost of each ghost for each target of light `s`, minus its cost as an extra ghost.
 
     The same sums as in `misfit`, in an order that vectorises the inner loop.
     """
+    targets, weights, slope = aims.targets, aims.weights, aims.slopes[s]
+    first, last = aims.spans[s], aims.spans[s + 1]
     for g in range(ghosts):
         parts[0, g] = values[g, PLACE] * slope
-        parts[1, g] = values[g, RADIUS] if signed else abs(values[g, RADIUS])
-        parts[2, g] = beyond(g, slope, values) ** 2
-        parts[3, g] = extra_cost(g, slope, values, extra)
+        parts[1, g] = values[g, RADIUS] if aims.signed else abs(values[g, RADIUS])
+        parts[2, g] = beyond_sight(g, slope, values) ** 2
+        parts[3, g] = extra_cost(g, slope, values, aims.extra)
     for t in range(first, last):
         place, radius = targets[t, T_PLACE], targets[t, T_RADIUS]
         by_place, by_size = weights[t, T_PLACE] ** 2, weights[t, T_RADIUS] ** 2
@@ -99,15 +102,14 @@ def fill_costs(ghosts, first, last, slope, signed, targets, weights, values, lig
 
 
 @inner
-def rematch(
-    ghosts, spans, slopes, signed, targets, weights, values, light, extra, chosen, cost, prices, small, parts, flags
-):
+def rematch(ghosts, aims, values, light, matching):
     """Match the ghosts of every light to its targets; return whether anything changed."""
+    cost, small, parts, chosen = matching.cost, matching.small, matching.parts, matching.chosen
     changed = False
-    for s in range(slopes.size):
-        first, last = spans[s], spans[s + 1]
-        fill_costs(ghosts, first, last, slopes[s], signed, targets, weights, values, light, extra, parts, cost)
-        assign(cost, last - first, ghosts, small[0], prices[s], small[1], small[2], parts[0], flags)
+    for s in range(aims.slopes.size):
+        first, last = aims.spans[s], aims.spans[s + 1]
+        fill_costs(ghosts, s, aims, values, light, parts, cost)
+        assign(cost, last - first, ghosts, small[0], matching.prices[s], small[1], small[2], parts[0], matching.flags)
         for t in range(first, last):
             if chosen[t] != small[0, t - first]:
                 chosen[t] = small[0, t - first]
@@ -116,21 +118,22 @@ def rematch(
 
 
 @inner
-def total_cost(ghosts, spans, slopes, signed, targets, weights, values, light, extra, chosen, taken, wanted):
-    """Return the sum of the squared residuals."""
+def total_cost(ghosts, aims, values, light, matching, missed):
+    """Return the sum of the squared residuals; `missed`: those of the limits of the lens."""
+    slopes, taken = aims.slopes, matching.taken
     total = 0.0
-    for m in range(wanted.size):
-        total += wanted[m] * wanted[m]
+    for m in range(missed.size):
+        total += missed[m] * missed[m]
     for s in range(slopes.size):
         for g in range(ghosts):
             taken[g] = False
-        for t in range(spans[s], spans[s + 1]):
-            g = chosen[t]
+        for t in range(aims.spans[s], aims.spans[s + 1]):
+            g = matching.chosen[t]
             taken[g] = True
-            total += misfit(t, g, slopes[s], signed, targets, weights, values, light)
-        if extra > 0.0:
+            total += misfit(t, g, slopes[s], aims, values, light)
+        if aims.extra > 0.0:
             for g in range(ghosts):
                 if not taken[g]:
-                    total += extra_cost(g, slopes[s], values, extra)
+                    total += extra_cost(g, slopes[s], values, aims.extra)
     # NaN means an impossible lens
     return total if total == total else np.inf

@@ -8,6 +8,7 @@ air.
 import numpy as np
 
 from ..jit.decorators import compiled, inner
+from .arguments import room_to_match, unmatch
 from .cost import light_counts, rematch, total_cost
 from .ghosts import COLUMNS, PLACE, RADIUS, REACH_THESIS, WORK_ROWS, light_values, list_ghosts
 from .local_search import LIMITS, limit_values, to_prescription
@@ -21,20 +22,13 @@ AIR_PART = 1.0 / 3.0
 
 
 @inner
-def decode(gene, stops, pattern, places, low, high, full, x, glass):
+def decode(gene, code, full, x, glass):
     """Decode genes to search variables and a pattern of glass; return the row of the stop.
 
     Parameters
     ----------
     gene : ndarray, shape (D,)
-    stops : ndarray, shape (S,), int64
-        Rows where the stop may be.
-    pattern : ndarray, shape (K,), int64
-        1: glass, 0: air, -1: the genes choose.
-    places : ndarray, shape (D,), int64
-        Meaning of each gene: 0 the stop, 1 + v search variable v.
-    low, high : ndarray, shape (2, 1 + 3 K)
-        Bounds of the search variables where a row's gap is air, and where it is glass.
+    code : GeneCode
     full : ndarray, shape (2 + 3 K,)
         Scratch.
     x : ndarray, shape (1 + 3 K,)
@@ -47,6 +41,7 @@ def decode(gene, stops, pattern, places, low, high, full, x, glass):
     Where the pattern is free, the nearest pattern without a surface between air and air is used: a group begins with
     glass, ends with air, and has no two adjacent gaps of air.
     """
+    stops, pattern, places, low, high = code
     rows = pattern.size
     for v in range(full.size):
         full[v] = 0.5
@@ -92,14 +87,13 @@ def fill_mirrors(stop, glass, mirrors):
 
 
 @compiled
-def decode_many(genes, stops, pattern, places, low, high, xs, rows_of_stop, glasses):
+def decode_many(genes, code, xs, rows_of_stop, glasses):
     """Decode many genes to search variables.
 
     Parameters
     ----------
     genes : ndarray, shape (B, D)
-    stops, pattern, places, low, high
-        As in `decode`.
+    code : GeneCode
     xs : ndarray, shape (B, 1 + 3 K)
         Filled.
     rows_of_stop : ndarray, shape (B,), int64
@@ -109,7 +103,7 @@ def decode_many(genes, stops, pattern, places, low, high, xs, rows_of_stop, glas
     """
     full = np.empty(xs.shape[1] + 1)
     for b in range(genes.shape[0]):
-        rows_of_stop[b] = decode(genes[b], stops, pattern, places, low, high, full, xs[b], glasses[b])
+        rows_of_stop[b] = decode(genes[b], code, full, xs[b], glasses[b])
 
 
 @inner
@@ -156,64 +150,64 @@ def sorted_misfit(sizes, places, found):
 
 
 @compiled
-def fitness_of_genes(
-    genes, stops, pattern, places, low, high, kind, entrance, slopes, spans, targets, weights, signed, extra,
-    ghost_targets, out,
-):  # fmt: skip
+def fitness_of_genes(genes, code, kind, entrance, aims, limits, out):
     """Compute the fitness of many genes.
 
     Parameters
     ----------
     genes : ndarray, shape (B, D), float64
-    stops, pattern, places, low, high
-        As in `decode`.
+    code : GeneCode
     kind : int
         OURS: the cost that `kernels.design.local_search.polish_many` minimises, at the best matching. ALGORITHM_1: the
-        mean of `sorted_misfit` over the lights, plus the squares of the missed lens targets.
-    entrance, slopes, spans, targets, weights, signed, extra, ghost_targets
+        mean of `sorted_misfit` over the lights, plus the squares of the exceeded limits.
+    entrance : float
+        Diameter, mm.
+    aims : GhostAims
+    limits
         As in `polish_many`.
     out : ndarray, shape (B,)
         Filled; an impossible lens costs 1e30.
     """
-    rows, count, most = pattern.size, targets.shape[0], 0
+    stops, rows, most = code.stops, code.pattern.size, 0
     for s in range(stops.size):
         front, rear = stops[s], rows - 1 - stops[s]
         most = max(most, front * (front - 1) // 2 + rear * (rear - 1) // 2)
     full, x, q = np.empty(2 + 3 * rows), np.empty(1 + 3 * rows), np.empty(1 + 3 * rows)
     glass, mirrors, work = np.empty(rows, np.bool_), np.empty(rows, np.bool_), np.empty((WORK_ROWS, rows))
     values, light = np.empty((most, COLUMNS)), np.zeros(most)
-    wanted, beam = np.empty(LIMITS + 2 * rows), np.empty(rows + 2)
-    chosen, small = np.empty(count, np.int64), np.empty((3, max(most, count)), np.int64)
-    table = np.empty((count, most) if kind == OURS else (1, 1))
-    prices, parts = np.empty((slopes.size, most)), np.empty((4, most))
-    flags, taken = np.empty(most, np.bool_), np.empty(most, np.bool_)
+    missed, beam = np.empty(LIMITS + 2 * rows), np.empty(rows + 2)
+    matching = room_to_match(aims.targets.shape[0], most, aims.slopes.size, kind == OURS)
     found = np.empty((most, 2))
-    lit = light_counts(weights)
+    lit = light_counts(aims.weights)
     for b in range(genes.shape[0]):
-        stop = decode(genes[b], stops, pattern, places, low, high, full, x, glass)
+        stop = decode(genes[b], code, full, x, glass)
         fill_mirrors(stop, glass, mirrors)
         to_prescription(x, 1 + rows, q)
         ghosts = list_ghosts(q, rows, stop, mirrors, entrance, work, values)
-        limit_values(q, rows, stop, entrance, work, ghost_targets, beam, wanted)
+        limit_values(q, rows, stop, entrance, work, limits, beam, missed)
         total = 0.0
         if kind == OURS:
             if lit:
                 light_values(q, rows, stop, mirrors, values, light)
-            for t in range(count):
-                chosen[t] = -1
-            prices[:] = 0.0
-            rematch(ghosts, spans, slopes, signed, targets, weights, values, light, extra, chosen, table, prices,
-                    small, parts, flags)  # fmt: skip
-            total = total_cost(ghosts, spans, slopes, signed, targets, weights, values, light, extra, chosen, taken,
-                               wanted)  # fmt: skip
+            unmatch(matching)
+            rematch(ghosts, aims, values, light, matching)
+            total = total_cost(ghosts, aims, values, light, matching, missed)
         else:
-            for s in range(slopes.size):
-                for g in range(ghosts):
-                    found[g, 0] = values[g, PLACE] * slopes[s]
-                    found[g, 1] = HIDDEN if slopes[s] > values[g, REACH_THESIS] else values[g, RADIUS]
-                span = targets[spans[s] : spans[s + 1]]
-                total += sorted_misfit(np.abs(span[:, 1]), span[:, 0], found[:ghosts]) / slopes.size
-            for m in range(wanted.size):
-                total += wanted[m] * wanted[m]
+            total = _algorithm_1(ghosts, aims, values, found)
+            for m in range(missed.size):
+                total += missed[m] * missed[m]
         # NaN means an impossible lens
         out[b] = min(total, 1e30) if total == total else 1e30
+
+
+@inner
+def _algorithm_1(ghosts, aims, values, found):
+    """Return the mean of `sorted_misfit` over the lights; `found` is a working array, shape (G, 2)."""
+    slopes, total = aims.slopes, 0.0
+    for s in range(slopes.size):
+        for g in range(ghosts):
+            found[g, 0] = values[g, PLACE] * slopes[s]
+            found[g, 1] = HIDDEN if slopes[s] > values[g, REACH_THESIS] else values[g, RADIUS]
+        span = aims.targets[aims.spans[s] : aims.spans[s + 1]]
+        total += sorted_misfit(np.abs(span[:, 1]), span[:, 0], found[:ghosts]) / slopes.size
+    return total

@@ -7,14 +7,13 @@ The variables of a search are log stop diameter, log thicknesses, curvatures and
 import numpy as np
 
 from ..jit.decorators import compiled, inner
+from .arguments import room_for_derivatives, room_for_ghosts, room_to_match, unmatch
 from .cost import T_LIGHT, T_PLACE, T_RADIUS, TINY, hidden_weight, light_counts, rematch, total_cost
 from .edge_thickness import edge_row, edge_values, fill_beam
 from .ghosts import (
-    COLUMNS,
     PLACE,
     RADIUS,
     REACH,
-    TRAIL,
     WORK_ROWS,
     add_by_prescription,
     add_gradient,
@@ -25,9 +24,9 @@ from .ghosts import (
     list_ghosts,
     reduce_rows,
 )
-from .vignetting import beyond, fill_mirrors_of_ghosts, sight_row
+from .vignetting import beyond_sight, fill_mirrors_of_ghosts, sight_row
 
-# rows of `ghost_targets` for the lens itself: least and largest value, and weight, of 1/efl (1/mm), 1/f-number and
+# rows of the lens' limits: least and largest value, and weight, of 1/efl (1/mm), 1/f-number and
 # length from the first vertex to the last (mm). A further row holds the least edge (mm), the steepest surface and the
 # weight of both (`kernels.design.edge_thickness`)
 LIMITS = 3
@@ -49,8 +48,8 @@ def system_matrix(rows, stop, work):
 
 
 @inner
-def limit_values(q, rows, stop, entrance, work, ghost_targets, beam, out):
-    """Fill the weighted distances of the prescription from the limits of its targets; 0 inside the limits."""
+def limit_values(q, rows, stop, entrance, work, limits, beam, out):
+    """Fill the weighted distances of the prescription from its limits; 0 inside them."""
     _, power, a = system_matrix(rows, stop, work)
     # 1 / f-number is stop diameter over |Ma00| efl
     speed = -power * q[0] / max(abs(a), 1e-12)
@@ -59,35 +58,37 @@ def limit_values(q, rows, stop, entrance, work, ghost_targets, beam, out):
         length += q[1 + k]
     for m in range(LIMITS):
         value = -power if m == 0 else (speed if m == 1 else length)
-        over = max(value - ghost_targets[m, 1], 0.0) - max(ghost_targets[m, 0] - value, 0.0)
-        out[m] = ghost_targets[m, 2] * over
-    if ghost_targets[LIMITS, 2] == 0.0:
+        over = max(value - limits[m, 1], 0.0) - max(limits[m, 0] - value, 0.0)
+        out[m] = limits[m, 2] * over
+    if limits[LIMITS, 2] == 0.0:
         for m in range(LIMITS, out.size):
             out[m] = 0.0
         return
     fill_beam(q, rows, stop, entrance, work, beam)
-    edge_values(q, rows, stop, ghost_targets[LIMITS], beam, out[LIMITS:])
+    edge_values(q, rows, stop, limits[LIMITS], beam, out[LIMITS:])
     for m in range(LIMITS, out.size):
-        out[m] *= ghost_targets[LIMITS, 2]
+        out[m] *= limits[LIMITS, 2]
 
 
 @compiled
-def limit_excess(q, stop, entrance, ghost_targets, out):
-    """Compute the weighted distances of a prescription from the limits of its targets.
+def limit_excess(q, stop, entrance, limits, out):
+    """Compute the weighted distances of a prescription from its limits.
 
     Parameters
     ----------
     q : ndarray, shape (1 + 3 K,)
         The prescription.
-    stop, entrance, ghost_targets
+    stop : int
+    entrance : float
+    limits
         As in `polish_many`.
-    out : ndarray, shape (GHOST_TARGETS + 2 K,)
+    out : ndarray, shape (LIMITS + 2 K,)
         Filled.
     """
     rows = (q.size - 1) // 3
     work, beam = np.empty((WORK_ROWS, rows)), np.empty(rows + 2)
     reduce_rows(q, rows, work)
-    limit_values(q, rows, stop, entrance, work, ghost_targets, beam, out)
+    limit_values(q, rows, stop, entrance, work, limits, beam, out)
 
 
 @inner
@@ -99,19 +100,39 @@ def _row(system, residual, m, weight, by, free, scale):
 
 
 @inner
-def fill_system(
-    q, rows, stop, entrance, ghosts, spans, slopes, signed, targets, weights, values, jacobian, light, light_by, extra,
-    chosen, taken, ghost_targets, wanted, free, scale, work, beam, trail, partial, row, system, between,
-):  # fmt: skip
-    """Fill the residuals (last column) and their derivatives; return the number of rows."""
+def fill_system(q, lens, aims, ghosts, found, matching, between, limits, missed, free, scale, room, system):
+    """Fill the residuals (last column) and their derivatives; return the number of rows.
+
+    Parameters
+    ----------
+    q : ndarray, shape (1 + 3 K,)
+    lens : LensStructure
+    aims : GhostAims
+    ghosts : int
+        Number of ghosts.
+    found : GhostValues
+    matching : Matching
+    between : ndarray, shape (G, 2), int64
+        Mirrors of every ghost.
+    limits
+        As in `polish_many`.
+    missed : ndarray, shape (LIMITS + 2 K,)
+        Filled by `limit_values`.
+    free, scale : ndarray, shape (F,)
+        Free variables, and the derivative of the prescription by each.
+    room : DerivativeRoom
+    system : ndarray, shape (M, F + 1)
+    """
+    slopes, targets, weights, taken = aims.slopes, aims.targets, aims.weights, matching.taken
+    values, jacobian, light, row = found.values, found.jacobian, found.light, room.row
     m = 0
     for s in range(slopes.size):
         for g in range(ghosts):
             taken[g] = False
-        for t in range(spans[s], spans[s + 1]):
-            g = chosen[t]
+        for t in range(aims.spans[s], aims.spans[s + 1]):
+            g = matching.chosen[t]
             taken[g] = True
-            flip = 1.0 if signed or values[g, RADIUS] >= 0.0 else -1.0
+            flip = 1.0 if aims.signed or values[g, RADIUS] >= 0.0 else -1.0
             if weights[t, T_PLACE] > 0.0:
                 w = weights[t, T_PLACE]
                 _row(system, w * (values[g, PLACE] * slopes[s] - targets[t, T_PLACE]), m, w * slopes[s],
@@ -124,69 +145,68 @@ def fill_system(
                 m += 1
             if weights[t, T_LIGHT] > 0.0:
                 w = weights[t, T_LIGHT]
-                _row(system, w * (light[g] - targets[t, T_LIGHT]), m, w, light_by[g], free, scale)
+                _row(system, w * (light[g] - targets[t, T_LIGHT]), m, w, found.light_by[g], free, scale)
                 m += 1
-            away, w = beyond(g, slopes[s], values), hidden_weight(t, targets, weights)
+            away, w = beyond_sight(g, slopes[s], values), hidden_weight(t, targets, weights)
             if away > 0.0 and w > 0.0:
-                sight_row(q, rows, stop, between[g, 0], between[g, 1], entrance, work, trail, partial, row)
+                sight_row(q, lens.mirrors.size, lens.stop, between[g, 0], between[g, 1], lens.entrance, room.work,
+                          room.trail, room.partial, row)  # fmt: skip
                 _row(system, w * away, m, w * slopes[s], row, free, scale)
                 m += 1
-        if extra > 0.0:
+        if aims.extra > 0.0:
             for g in range(ghosts):
                 radius = values[g, RADIUS]
                 if not taken[g] and abs(radius) > TINY and slopes[s] <= values[g, REACH]:
-                    r = np.sqrt(extra / abs(radius))
+                    r = np.sqrt(aims.extra / abs(radius))
                     _row(system, r, m, -0.5 * r / radius, jacobian[1, g], free, scale)
                     m += 1
-    return fill_ghost_target_rows(
-        q, rows, stop, entrance, ghost_targets, wanted, free, scale, work, beam, trail, partial, row, system, m
-    )
+    return fill_limit_rows(q, lens, limits, missed, free, scale, room, system, m)
 
 
 @inner
-def fill_ghost_target_rows(
-    q, rows, stop, entrance, ghost_targets, wanted, free, scale, work, beam, trail, partial, row, system, m
-):  # fmt: skip
-    """Append the missed lens targets and their derivatives to a system from row `m`; return its number of rows."""
-    limit_values(q, rows, stop, entrance, work, ghost_targets, beam, wanted)
-    for ghost_target in range(LIMITS):
-        if wanted[ghost_target] != 0.0:
-            _ghost_target_row(q, rows, stop, ghost_target, work, trail, partial, row)
-            _row(system, wanted[ghost_target], m, ghost_targets[ghost_target, 2], row, free, scale)
+def fill_limit_rows(q, lens, limits, missed, free, scale, room, system, m):
+    """Append the exceeded limits and their derivatives to a system from row `m`; return its number of rows."""
+    rows, stop, row = lens.mirrors.size, lens.stop, room.row
+    limit_values(q, rows, stop, lens.entrance, room.work, limits, room.beam, missed)
+    for limit in range(LIMITS):
+        if missed[limit] != 0.0:
+            _limit_row(q, rows, stop, limit, room, row)
+            _row(system, missed[limit], m, limits[limit, 2], row, free, scale)
             m += 1
-    for number in range(wanted.size - LIMITS):
-        if wanted[LIMITS + number] != 0.0:
-            edge_row(q, rows, stop, number, ghost_targets[LIMITS], work, beam, trail, partial, row)
-            _row(system, wanted[LIMITS + number], m, ghost_targets[LIMITS, 2], row, free, scale)
+    for number in range(missed.size - LIMITS):
+        if missed[LIMITS + number] != 0.0:
+            edge_row(q, rows, stop, number, limits[LIMITS], room.work, room.beam, room.trail, room.partial, row)
+            _row(system, missed[LIMITS + number], m, limits[LIMITS, 2], row, free, scale)
             m += 1
     return m
 
 
 @inner
-def _ghost_target_row(q, rows, stop, ghost_target, work, trail, partial, row):
-    """Differentiate one lens target, 1/efl, 1/f-number or length, by the prescription."""
+def _limit_row(q, rows, stop, limit, room, row):
+    """Differentiate what one limit restricts, 1/efl, 1/f-number or length, by the prescription."""
+    work, trail, partial = room.work, room.trail, room.partial
     for v in range(row.size):
         row[v] = 0.0
-    if ghost_target == 2:
+    if limit == 2:
         for k in range(rows - 1):
             row[1 + k] = 1.0
         return
     _, power, a0 = system_matrix(rows, stop, work)
     _, _, g, h = fill_suffix(stop, rows, work)
     a, _, c, _ = fill_suffix(0, stop, work)
-    factor = -1.0 if ghost_target == 0 else -q[0] / abs(a0)
+    factor = -1.0 if limit == 0 else -q[0] / abs(a0)
     add_gradient(0, stop, -1, -1, 1.0, 0.0, g, h, work, trail, partial)
     add_by_prescription(q, rows, 0, stop, partial, factor, row)
     add_gradient(stop, rows, -1, -1, a, c, 0.0, 1.0, work, trail, partial)
     add_by_prescription(q, rows, stop, rows, partial, factor, row)
-    if ghost_target == 1:
+    if limit == 1:
         add_gradient(0, stop, -1, -1, 1.0, 0.0, 1.0, 0.0, work, trail, partial)
         add_by_prescription(q, rows, 0, stop, partial, power * q[0] / (abs(a0) * a0), row)
         row[0] -= power / abs(a0)
 
 
 @inner
-def normal_equations(system, count, unknowns, normal):
+def fill_normal_equations(system, count, unknowns, normal):
     """Fill the lower triangle of J'J and, as last row, J'r; sum four rows at a time to keep the sums in registers."""
     for a in range(unknowns + 1):
         for b in range(a + 1):
@@ -270,43 +290,39 @@ def step_within(x, step, stretch, reach, free, low, high, trial):
         trial[free[v]] = min(max(x[free[v]] + move, low[free[v]]), high[free[v]])
 
 
+@inner
+def fill_ghosts(q, lens, lit, work, found):
+    """Fill the ghosts of a prescription, and their brightness if any target has one."""
+    rows = lens.mirrors.size
+    list_ghosts(q, rows, lens.stop, lens.mirrors, lens.entrance, work, found.values)
+    if lit:
+        light_values(q, rows, lens.stop, lens.mirrors, found.values, found.light)
+
+
+@inner
+def fill_derivatives(q, lens, lit, room, found):
+    """Fill the ghosts of a prescription and their derivatives, those of their brightness if any target has one."""
+    rows, stop, mirrors = lens.mirrors.size, lens.stop, lens.mirrors
+    differentiate_ghosts(q, rows, stop, mirrors, lens.entrance, lit, room.work, room.trail, room.partial, room.common,
+                         found.values, found.jacobian)  # fmt: skip
+    if lit:
+        brightness_of_ghosts(q, rows, stop, mirrors, found.values, found.jacobian, found.light, found.light_by)
+
+
 @compiled
-def polish_many(
-    starts, stop, mirrors, entrance, low, high, free, reach, slopes, spans, targets, weights, signed, extra,
-    ghost_targets, steps, patience, enough, ends, costs, matches,
-):  # fmt: skip
+def polish_many(starts, lens, space, aims, limits, effort, ends, costs, matches):
     """Run one local search from each of several starting points.
 
     Parameters
     ----------
     starts : ndarray, shape (B, 1 + 3 K), float64
         Search variables: log stop diameter, log thicknesses, curvatures, indices.
-    stop, mirrors, entrance
-        As in `kernels.design.ghosts.ghosts_of_many`.
-    low, high : ndarray, shape (1 + 3 K,)
-        Bounds of the search variables, never exceeded.
-    free : ndarray, shape (F,), int64
-        Indices of the variables that may change.
-    reach : ndarray, shape (F,)
-        Largest change of each free variable in one step.
-    slopes : ndarray, shape (L,)
-        Slope of each light.
-    spans : ndarray, shape (L + 1,), int64
-        First target of each light, and the end of the last.
-    targets, weights : ndarray, shape (N, 3)
-        Place, radius and log irradiance; a weight of 0 ignores the value.
-    signed : bool
-        Whether the radii of targets have a sign.
-    extra : float
-        Cost of an extra ghost times its radius.
-    ghost_targets : ndarray, shape (GHOST_TARGETS + 1, 3)
+    lens : LensStructure
+    space : FreeVariables
+    aims : GhostAims
+    limits : ndarray, shape (LIMITS + 1, 3)
         Least, largest and weight of 1/efl, 1/f-number and length; least edge, steepest surface and their weight.
-    steps : int
-        Largest number of steps of a search.
-    patience : int
-        Steps before ghosts are first rematched; the intervals grow.
-    enough : float
-        Cost at which a search ends.
+    effort : Effort
     ends : ndarray, shape (B, 1 + 3 K)
         Filled: search variables at the end of each search.
     costs : ndarray, shape (B,)
@@ -319,66 +335,49 @@ def polish_many(
     Levenberg 1944, Marquardt 1963, with damping relative to the diagonal. A variable at a bound that the gradient
     pushes outward is held for that step (active set); the step is then clipped to the bounds.
     """
-    size, count, lights = starts.shape[1], targets.shape[0], slopes.size
+    size, count, lights = starts.shape[1], aims.targets.shape[0], aims.slopes.size
     rows = (size - 1) // 3
     logs = 1 + rows
-    most = ghosts_of_structure(stop, rows, mirrors)
-    work, trail, partial = np.empty((WORK_ROWS, rows)), np.empty(TRAIL * rows), np.zeros((4, rows))
-    common, jacobian = np.empty((6, size)), np.empty((3, most, size))
-    values, light, light_by = np.empty((most, COLUMNS)), np.zeros(most), np.zeros((most, size))
+    stop, entrance = lens.stop, lens.entrance
+    low, high, free, reach = space
+    most = ghosts_of_structure(stop, rows, lens.mirrors)
+    room, found = room_for_derivatives(rows), room_for_ghosts(most, size)
+    values, light = found.values, found.light
     unknowns = free.size
     between = np.empty((most, 2), np.int64)
-    fill_mirrors_of_ghosts(stop, rows, mirrors, between)
+    fill_mirrors_of_ghosts(stop, rows, lens.mirrors, between)
     system = np.empty((4 * count + lights * most + LIMITS + 2 * rows + 4, unknowns + 1))
     normal, factor = np.empty((unknowns + 1, unknowns + 1)), np.empty((unknowns, unknowns))
     step, scale, held = np.empty(unknowns), np.empty(unknowns), np.empty(unknowns, np.bool_)
-    cost_table, small = np.empty((count, most)), np.empty((3, max(most, count)), np.int64)
-    prices, parts = np.empty((lights, most)), np.empty((4, most))
-    flags, taken = np.empty(most, np.bool_), np.empty(most, np.bool_)
-    wanted, beam, row = np.empty(LIMITS + 2 * rows), np.empty(rows + 2), np.empty(size)
+    matching = room_to_match(count, most, lights, True)
+    missed = np.empty(LIMITS + 2 * rows)
     x, trial, q = np.empty(size), np.empty(size), np.empty(size)
-    chosen = np.empty(count, np.int64)
-    lit = light_counts(weights)
+    lit = light_counts(aims.weights)
     for b in range(starts.shape[0]):
         clip_start(starts[b], low, high, x)
-        for t in range(count):
-            chosen[t] = -1
-        # reset the prices so that a search does not depend on the one before
-        prices[:] = 0.0
+        unmatch(matching)
         to_prescription(x, logs, q)
-        list_ghosts(q, rows, stop, mirrors, entrance, work, values)
-        if lit:
-            light_values(q, rows, stop, mirrors, values, light)
-        rematch(most, spans, slopes, signed, targets, weights, values, light, extra, chosen, cost_table, prices,
-                small, parts, flags)  # fmt: skip
-        limit_values(q, rows, stop, entrance, work, ghost_targets, beam, wanted)
-        cost = total_cost(most, spans, slopes, signed, targets, weights, values, light, extra, chosen, taken, wanted)
-        damping, pause, since = 1e-2, patience, 0
-        for _ in range(steps):
+        fill_ghosts(q, lens, lit, room.work, found)
+        rematch(most, aims, values, light, matching)
+        limit_values(q, rows, stop, entrance, room.work, limits, room.beam, missed)
+        cost = total_cost(most, aims, values, light, matching, missed)
+        damping, pause, since = 1e-2, effort.patience, 0
+        for _ in range(effort.steps):
             to_prescription(x, logs, q)
-            differentiate_ghosts(q, rows, stop, mirrors, entrance, lit, work, trail, partial, common, values, jacobian)
-            if lit:
-                brightness_of_ghosts(q, rows, stop, mirrors, values, jacobian, light, light_by)
+            fill_derivatives(q, lens, lit, room, found)
             fill_scale(q, free, logs, scale)
-            filled = fill_system(
-                q, rows, stop, entrance, most, spans, slopes, signed, targets, weights, values, jacobian, light,
-                light_by, extra, chosen, taken, ghost_targets, wanted, free, scale, work, beam, trail, partial, row,
-                system, between,
-            )  # fmt: skip
-            normal_equations(system, filled, unknowns, normal)
+            filled = fill_system(q, lens, aims, most, found, matching, between, limits, missed, free, scale, room,
+                                 system)  # fmt: skip
+            fill_normal_equations(system, filled, unknowns, normal)
             hold_at_bounds(normal[unknowns], x, free, low, high, held)
             better = cost
             for _ in range(8):
                 if damped_step(normal, unknowns, damping, held, factor, step):
                     step_within(x, step, 1.0, reach, free, low, high, trial)
                     to_prescription(trial, logs, q)
-                    list_ghosts(q, rows, stop, mirrors, entrance, work, values)
-                    if lit:
-                        light_values(q, rows, stop, mirrors, values, light)
-                    limit_values(q, rows, stop, entrance, work, ghost_targets, beam, wanted)
-                    better = total_cost(
-                        most, spans, slopes, signed, targets, weights, values, light, extra, chosen, taken, wanted
-                    )
+                    fill_ghosts(q, lens, lit, room.work, found)
+                    limit_values(q, rows, stop, entrance, room.work, limits, room.beam, missed)
+                    better = total_cost(most, aims, values, light, matching, missed)
                     if better < cost:
                         break
                 damping = max(damping, 1e-8) * 5.0
@@ -392,28 +391,22 @@ def polish_many(
             else:
                 stalled = True
                 to_prescription(x, logs, q)
-                list_ghosts(q, rows, stop, mirrors, entrance, work, values)
-                if lit:
-                    light_values(q, rows, stop, mirrors, values, light)
-                limit_values(q, rows, stop, entrance, work, ghost_targets, beam, wanted)
-            if cost <= enough:
+                fill_ghosts(q, lens, lit, room.work, found)
+                limit_values(q, rows, stop, entrance, room.work, limits, room.beam, missed)
+            if cost <= effort.enough:
                 break
             if since >= pause or stalled:
                 since = 0
                 pause += pause // 2 + 1
-                changed = rematch(most, spans, slopes, signed, targets, weights, values, light, extra, chosen,
-                                  cost_table, prices, small, parts, flags)  # fmt: skip
-                if changed:
-                    cost = total_cost(
-                        most, spans, slopes, signed, targets, weights, values, light, extra, chosen, taken, wanted
-                    )
+                if rematch(most, aims, values, light, matching):
+                    cost = total_cost(most, aims, values, light, matching, missed)
                     damping = max(damping, 1e-4)
                 elif stalled:
                     break
         for v in range(size):
             ends[b, v] = x[v]
         for t in range(count):
-            matches[b, t] = chosen[t]
+            matches[b, t] = matching.chosen[t]
         costs[b] = cost
 
 

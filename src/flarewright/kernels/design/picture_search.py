@@ -6,21 +6,27 @@ ghosts lie. A ghost's level is proportional to 1 / radius, as Van Acoleyen 2025,
 colours.
 """
 
+from __future__ import annotations
+
+from typing import NamedTuple
+
 import numpy as np
 
+from ...typing import Floats
 from ..jit.decorators import compiled, inner
+from .arguments import room_for_derivatives
 from .cost import TINY
-from .ghosts import BOUND, COLUMNS, PLACE, RADIUS, REACH_THESIS, TRAIL, WORK_ROWS, differentiate_ghosts, list_ghosts
+from .ghosts import BOUND, COLUMNS, PLACE, RADIUS, REACH_THESIS, differentiate_ghosts, list_ghosts
 from .local_search import (
     LIMITS,
     clip_start,
     damped_step,
-    fill_ghost_target_rows,
+    fill_limit_rows,
+    fill_normal_equations,
     fill_scale,
     ghosts_of_structure,
     hold_at_bounds,
     limit_values,
-    normal_equations,
     step_within,
     to_prescription,
 )
@@ -108,7 +114,7 @@ def draw_picture(shown, edges, rows, limits, start, pixel, out):
     shown : ndarray, shape (G, 4)
         AT, SIZE, LEVEL, SHAPE.
     edges, rows, limits, start, pixel
-        As in `polish_by_picture`, for one light.
+        As in `kernels.design.arguments.TargetPicture`, for one light.
     out : ndarray, shape (V, U)
         Filled; light is clipped at 1.
     """
@@ -174,18 +180,38 @@ def show(values, slope, light, round_only, shown):
         shown[g, SHAPE] = ROUND if round_only or values[g, BOUND] != 0.0 else (0 if radius > 0.0 else 1)
 
 
+class _Drawing(NamedTuple):
+    """Working arrays for the comparison of a row of pixels.
+
+    Attributes
+    ----------
+    shown, spans : ndarray, shape (G, 4)
+        The drawn ghosts of one light, and their spans of a row (`draw_row`).
+    row : ndarray, shape (U + 2,)
+    off : ndarray, shape (U,)
+    sums : ndarray, shape (U + 1,)
+    """
+
+    shown: Floats
+    spans: Floats
+    row: Floats
+    off: Floats
+    sums: Floats
+
+
 @inner
-def picture_cost(
-    values, missed, slopes, light, unit, edges, rows, limits, start, pixel, wanted, shown, row, spans, off, sums, by
-):
+def picture_cost(values, missed, slopes, picture, drawing, by):
     """Return the cost of a lens: `unit` times the squared differences of its pictures, plus the squares of `missed`."""
+    shown, spans, row, off, sums = drawing
+    edges = picture.edges
     total = 0.0
     for m in range(missed.size):
         total += missed[m] * missed[m]
     for s in range(slopes.size):
-        show(values, slopes[s], light, edges.shape[2] == 0, shown)
-        total += unit * compare(
-            shown, edges[s], rows, limits[s], start, pixel, wanted[s], row, spans, off, sums, by[s]
+        show(values, slopes[s], picture.light, edges.shape[2] == 0, shown)
+        total += picture.unit * compare(
+            shown, edges[s], picture.rows, picture.limits[s], picture.start, picture.pixel, picture.wanted[s], row,
+            spans, off, sums, by[s],
         )  # fmt: skip
     # NaN means an impossible lens
     return total if total == total else np.inf
@@ -220,33 +246,20 @@ def fill_picture_rows(values, jacobian, slopes, unit, by, free, scale, push, sys
 
 
 @compiled
-def polish_by_picture(
-    starts, stop, mirrors, entrance, low, high, free, reach, slopes, ghost_targets, light, unit, edges, rows, limits,
-    start, pixel, wanted, steps, worth, ends, costs,
-):  # fmt: skip
+def polish_by_picture(starts, lens, space, slopes, limits, picture, steps, worth, ends, costs):
     """Run one local search from each of several starting points.
 
     Parameters
     ----------
     starts : ndarray, shape (B, 1 + 3 K), float64
         Search variables, as in `kernels.design.local_search.polish_many`.
-    stop, mirrors, entrance, low, high, free, reach, slopes, ghost_targets
+    lens : LensStructure
+    space : FreeVariables
+    slopes : ndarray, shape (L,)
+        Slope of each light.
+    limits
         As in `polish_many`.
-    light : float
-        Level of a ghost times its radius, mm.
-    unit : float
-        Cost of a mean squared difference of 1.
-    edges : ndarray, shape (L, 2, E, 2)
-        For each light the upright and the inverted polygon of radius 1: for every edge the apothem over the cosine, and
-        the tangent, of the angle between its normal and the line. E = 0: ghosts are round.
-    rows : ndarray, shape (V, 2)
-        Distance of each row of pixels from the line (mm), and a pixel's part of the picture's area.
-    limits : ndarray, shape (L, V, 2)
-        Begin and end of each row in the picture, in pixels from `start`.
-    start, pixel : float
-        Start of the rows and length of a pixel, mm.
-    wanted : ndarray, shape (L, V, U)
-        The target pictures; U is two pixels more than any row reaches.
+    picture : TargetPicture
     steps : int
         Largest number of evaluations of a search; 0: only compute the cost.
     worth : float
@@ -261,40 +274,40 @@ def polish_by_picture(
     Damped Gauss-Newton, with bounds as in `polish_many`. The cost of an edge that is off by more than a pixel grows
     linearly and not quadratically, so the step after a successful one is stretched.
     """
-    size, unknowns = starts.shape[1], free.size
+    size, unknowns = starts.shape[1], space.free.size
     count = (size - 1) // 3
     logs = 1 + count
+    stop, mirrors, entrance = lens
+    low, high, free, reach = space
     most = ghosts_of_structure(stop, count, mirrors)
-    work, trail, partial = np.empty((WORK_ROWS, count)), np.empty(TRAIL * count), np.zeros((4, count))
-    common, jacobian, values = np.empty((6, size)), np.empty((3, most, size)), np.empty((most, COLUMNS))
+    room = room_for_derivatives(count)
+    jacobian, values = np.empty((3, most, size)), np.empty((most, COLUMNS))
     system = np.empty((2 * most * slopes.size + LIMITS + 2 * count + 4, unknowns + 1))
     normal, factor = np.empty((unknowns + 1, unknowns + 1)), np.empty((unknowns, unknowns))
     step, scale, push, held = np.empty(unknowns), np.empty(unknowns), np.empty(unknowns), np.empty(unknowns, np.bool_)
-    missed, beam, line = np.empty(LIMITS + 2 * count), np.empty(count + 2), np.empty(size)
+    missed = np.empty(LIMITS + 2 * count)
     x, trial, q = np.empty(size), np.empty(size), np.empty(size)
-    shown, spans = np.empty((most, 4)), np.empty((most, 4))
-    row, off, sums = np.empty(wanted.shape[2] + 2), np.empty(wanted.shape[2]), np.empty(wanted.shape[2] + 1)
+    columns = picture.wanted.shape[2]
+    drawing = _Drawing(
+        np.empty((most, 4)), np.empty((most, 4)), np.empty(columns + 2), np.empty(columns), np.empty(columns + 1)
+    )
     by, new_by = np.empty((slopes.size, most, 5)), np.empty((slopes.size, most, 5))
     for b in range(starts.shape[0]):
         clip_start(starts[b], low, high, x)
         to_prescription(x, logs, q)
-        list_ghosts(q, count, stop, mirrors, entrance, work, values)
-        limit_values(q, count, stop, entrance, work, ghost_targets, beam, missed)
-        cost = picture_cost(values, missed, slopes, light, unit, edges, rows, limits, start, pixel, wanted, shown, row,
-                            spans, off, sums, by)  # fmt: skip
+        list_ghosts(q, count, stop, mirrors, entrance, room.work, values)
+        limit_values(q, count, stop, entrance, room.work, limits, room.beam, missed)
+        cost = picture_cost(values, missed, slopes, picture, drawing, by)
         left = steps if cost <= worth else 0
         damping, stretch, slow = 1e-3, 1.0, 0
         while left > 0 and slow < MOST_SLOW:
             to_prescription(x, logs, q)
-            differentiate_ghosts(q, count, stop, mirrors, entrance, False, work, trail, partial, common, values,
-                                 jacobian)  # fmt: skip
+            differentiate_ghosts(q, count, stop, mirrors, entrance, False, room.work, room.trail, room.partial,
+                                 room.common, values, jacobian)  # fmt: skip
             fill_scale(q, free, logs, scale)
-            filled = fill_picture_rows(values, jacobian, slopes, unit, by, free, scale, push, system)
-            filled = fill_ghost_target_rows(
-                q, count, stop, entrance, ghost_targets, missed, free, scale, work, beam, trail, partial, line, system,
-                filled,
-            )  # fmt: skip
-            normal_equations(system, filled, unknowns, normal)
+            filled = fill_picture_rows(values, jacobian, slopes, picture.unit, by, free, scale, push, system)
+            filled = fill_limit_rows(q, lens, limits, missed, free, scale, room, system, filled)
+            fill_normal_equations(system, filled, unknowns, normal)
             for v in range(unknowns):
                 normal[unknowns, v] += push[v]
             hold_at_bounds(normal[unknowns], x, free, low, high, held)
@@ -304,10 +317,9 @@ def polish_by_picture(
                 if damped_step(normal, unknowns, damping, held, factor, step):
                     step_within(x, step, stretch, reach, free, low, high, trial)
                     to_prescription(trial, logs, q)
-                    list_ghosts(q, count, stop, mirrors, entrance, work, values)
-                    limit_values(q, count, stop, entrance, work, ghost_targets, beam, missed)
-                    better = picture_cost(values, missed, slopes, light, unit, edges, rows, limits, start, pixel,
-                                          wanted, shown, row, spans, off, sums, new_by)  # fmt: skip
+                    list_ghosts(q, count, stop, mirrors, entrance, room.work, values)
+                    limit_values(q, count, stop, entrance, room.work, limits, room.beam, missed)
+                    better = picture_cost(values, missed, slopes, picture, drawing, new_by)
                     if better < cost:
                         break
                 damping = damping if stretch > 1.0 else 4.0 * damping

@@ -9,7 +9,7 @@ from .ghosts import REACH_THESIS, add_by_prescription, add_gradient, fill_suffix
 
 
 @inner
-def beyond(g, slope, values):
+def beyond_sight(g, slope, values):
     """Return the light's slope over the slope at which the ghost's centre is hidden; 0 where it is visible."""
     ratio = slope / values[g, REACH_THESIS]
     return ratio if ratio > 1.0 else 0.0

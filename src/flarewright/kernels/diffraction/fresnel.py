@@ -1,9 +1,14 @@
 """Fresnel propagation of an opening: its samples, and its spectrum times phase factors averaged over a band."""
 
+from __future__ import annotations
+
 from math import pi, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ...typing import Pixels
 from ..jit.decorators import compiled
 from ..tracing.clip import blade_value
 
@@ -91,8 +96,57 @@ def sum_turns(rows, columns, table):
             table[i * count + j] = np.complex64(complex(real[j], imaginary[j]))
 
 
+class BandAreas(NamedTuple):
+    """The mean of |lambda L| over a band in x and y, mm^2, and the sign of their product.
+
+    Attributes
+    ----------
+    x, y : float
+    side : float
+        1 if both areas have the same sign, else -1: then the phase depends on the difference of both terms, the fade on
+        their sum.
+    """
+
+    x: float
+    y: float
+    side: float
+
+
+class FrequencyLimits(NamedTuple):
+    """Where the spectrum of a grid ends.
+
+    Attributes
+    ----------
+    finest : tuple of float
+        Squares of the grid's highest frequencies in x and y, 1/mm^2.
+    ends : tuple of float
+        Parts of these between which the spectrum fades out smoothly; infinite for no fade.
+    """
+
+    finest: tuple[float, float]
+    ends: tuple[float, float]
+
+
+class PhaseTables(NamedTuple):
+    """A band's phase factors, by steps of f^2 times the area.
+
+    Attributes
+    ----------
+    turns : ndarray, shape (S,), complex64
+        Phase factors (`sum_turns`).
+    fades : ndarray, shape (S,), float32
+        Amplitude factors; 0 at the last step and beyond.
+    to_step : float
+        Steps per f^2 times the area.
+    """
+
+    turns: NDArray[np.complex64]
+    fades: Pixels
+    to_step: float
+
+
 @compiled
-def turn_frequencies(spectrum, across, down, area_x, area_y, side, finest, ends, table, fades, to_step, turned):
+def turn_frequencies(spectrum, across, down, areas, limits, tables, turned):
     """Multiply an opening's spectrum by the real and the imaginary part of a band's phase factor.
 
     Parameters
@@ -101,21 +155,9 @@ def turn_frequencies(spectrum, across, down, area_x, area_y, side, finest, ends,
         Half spectrum of a real opening, Nx even.
     across, down : ndarray, shape (C,) and (Ny,)
         Squared frequencies in x and y, 1/mm^2; those in x up to the last that is not 0.
-    area_x, area_y : float
-        |lambda L| in x and y, mm^2.
-    side : float
-        1 if both areas have the same sign, else -1: then the phase depends on the difference of both terms, the fade on
-        their sum.
-    finest : tuple of float
-        Squares of the grid's highest frequencies in x and y, 1/mm^2.
-    ends : tuple of float
-        Parts of these between which the spectrum fades out smoothly; infinite for no fade.
-    table : ndarray, shape (S,), complex64
-        Phase factors, by steps of f^2 times the area.
-    fades : ndarray, shape (S,), float32
-        Amplitude factors by the same steps; 0 at the last step and beyond.
-    to_step : float
-        Steps per f^2 times the area.
+    areas : BandAreas
+    limits : FrequencyLimits
+    tables : PhaseTables
     turned : ndarray, shape (2, Ny, C), complex64
         Filled.
 
@@ -124,8 +166,10 @@ def turn_frequencies(spectrum, across, down, area_x, area_y, side, finest, ends,
     float
         Sum of |spectrum * phase factor|^2 over all frequencies, negative ones included.
     """
+    area_x, area_y, side = areas
+    (first, beyond), finest = limits.ends, limits.finest
+    table, fades, to_step = tables
     last = fades.size - 1
-    first, beyond = ends
     part_x, part_y = 1.0 / finest[0], 1.0 / finest[1]
     light = 0.0
     for i in range(down.size):

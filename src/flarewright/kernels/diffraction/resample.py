@@ -7,12 +7,13 @@ Coordinates are in mm from the centre of the pattern, x to the right, y up; the 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...typing import Floats
-from ..jit.decorators import compiled, inlined
+from ..jit.decorators import borrowing, compiled, inlined
 
 Picture = NDArray[np.floating]
 
@@ -165,22 +166,38 @@ def blend_fan_wings(
                 out[i, j, c] = (1.0 - w) * out[i, j, c] + wing * colour[c]
 
 
+class SpikeTables(NamedTuple):
+    """The profiles of the spikes of an iris of blades, averaged over fringes.
+
+    Attributes
+    ----------
+    angle : ndarray, shape (B,)
+        Direction of each blade's normal; a blade sends light in both directions along it.
+    half_fan : float
+        Half the angle that a curved blade subtends at its centre of curvature; 0 for a straight blade.
+    cumulative, slopes : ndarray, shape (B, V, C)
+        Cumulative profile across each spike at v = k * step, and the profile.
+    half_total, tail : ndarray, shape (C,)
+        Asymptote of the cumulative profile far from the spike: half_total - tail / v.
+    step : float
+        Step of the tables in v.
+    scale : float
+        v per mm across the spike.
+    """
+
+    angle: Floats
+    half_fan: float
+    cumulative: Floats
+    slopes: Floats
+    half_total: Floats
+    tail: Floats
+    step: float
+    scale: float
+
+
 @compiled
 def blend_blade_wings(
-    x: Floats,
-    y: Floats,
-    pixel: Floats,
-    angle: Floats,
-    half_fan: float,
-    tables: Floats,
-    slopes: Floats,
-    half_total: Floats,
-    tail: Floats,
-    step: float,
-    scale: float,
-    inner: float,
-    outer: float,
-    out: Picture,
+    x: Floats, y: Floats, pixel: Floats, spikes: SpikeTables, inner: float, outer: float, out: Picture
 ) -> None:
     """Cross-fade from the core to the fringe-averaged wings of the blades' edges.
 
@@ -190,93 +207,26 @@ def blend_blade_wings(
         Pixel centres.
     pixel : (2,) float64
         Width and height of a pixel.
-    angle : (B,) float64
-        Direction of each blade's normal; a blade sends light in both directions along it.
-    half_fan : float
-        Half the angle that a curved blade subtends at its centre of curvature; 0 for a straight blade.
-    tables, slopes : (B, V, C) float64
-        Cumulative profile across each spike at v = k * step, and the profile.
-    half_total, tail : (C,) float64
-        Asymptote of the cumulative profile far from the spike: half_total - tail / v.
-    step : float
-        Step of the tables in v.
-    scale : float
-        v per mm across the spike.
+    spikes : SpikeTables
     inner, outer : float
         Radii of the cross-fade from core to wings.
     out : (H, W, C) float
         Irradiance of the core on entry, of core and wings on return.
     """
-    blades = angle.shape[0]
-    width = x.shape[0]
-    channels = out.shape[2]
-    per_step = 1.0 / step
-    end = (tables.shape[1] - 2) * step
-    cos_fan, sin_fan = math.cos(half_fan), math.sin(half_fan)
+    width, channels = x.shape[0], out.shape[2]
+    half_total, tail = spikes.half_total, spikes.tail
     total = np.empty((channels, width))
     # single precision for the vectorised loop over all pixels; v^2 - half^2 does not cancel outside the table
-    far, flat, near = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.uint8)
-    x32, zero, one = x.astype(np.float32), np.float32(0.0), np.float32(1.0)
-    scale32, end32, fan32 = np.float32(scale), np.float32(end), np.float32(half_fan)
-    cos32, sin32 = np.float32(cos_fan), np.float32(sin_fan)
+    x32, far, flat = x.astype(np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
+    near = np.empty(width, np.uint8)
     area = pixel[0] * pixel[0] + pixel[1] * pixel[1]
-    # A straight blade has no fan: the cumulative profile is differenced over a quarter step each way to give its slope.
-    least = 0.25 * step
-    least32 = np.float32(least)
     for i in range(y.shape[0]):
-        y32 = np.float32(y[i])
         for j in range(width):
-            far[j], flat[j] = zero, zero
+            far[j], flat[j] = np.float32(0.0), np.float32(0.0)
         total[:, :] = 0.0
-        for b in range(blades):
-            nx, ny = math.cos(angle[b]), math.sin(angle[b])
-            nx32, ny32 = np.float32(nx), np.float32(ny)
-            # Outside the table all channels share closed forms: beside the spike or its fan, and deep inside the fan.
-            for j in range(width):
-                r = math.sqrt(x32[j] * x32[j] + y32 * y32)
-                along, across = abs(nx32 * x32[j] + ny32 * y32), abs(nx32 * y32 - ny32 * x32[j])
-                N, D = across * cos32 - along * sin32, along * cos32 + across * sin32
-                wide = r * fan32 * scale32
-                wide = wide if wide > least32 else least32
-                v = r * scale32 * (fan32 * D + N)
-                # half_fan - theta is its sine, -N / r, to a few percent of a term that is itself a few per mille
-                depth = -N * scale32
-                beside, inside = v > (end32 + wide) * D, depth > end32
-                # within the table `depth` may be 0: divide 0 by 1
-                over = v * v - wide * wide * D * D if beside else depth * (depth - wide - wide) if inside else one
-                far[j] += (D * D if beside else one if inside else zero) / over
-                flat[j] += (one if inside else zero) / wide
-                near[j] = 0 if beside or inside else 1
-            for j in range(width):
-                if not near[j]:
-                    continue
-                r = math.sqrt(x[j] * x[j] + y[i] * y[i])
-                along, across = abs(nx * x[j] + ny * y[i]), abs(nx * y[i] - ny * x[j])
-                N, D = across * cos_fan - along * sin_fan, along * cos_fan + across * sin_fan
-                half = max(r * half_fan * scale, least)
-                theta = half_fan + N / D if N > 0.0 else math.atan2(across, along)
-                v = r * theta * scale
-                # the profile's integral from one side of the fan to the other: a Hermite cubic in the table
-                for side in range(2):
-                    at = v + half if side == 0 else v - half
-                    sign = (1.0 if at >= 0.0 else -1.0) * (0.5 - side) / half
-                    at = abs(at)
-                    k = int(at * per_step)
-                    if k >= tables.shape[1] - 1:
-                        for c in range(channels):
-                            total[c, j] += sign * (half_total[c] - tail[c] / at)
-                        continue
-                    f = at * per_step - k
-                    g = 1.0 - f
-                    w0, w1 = sign * (1.0 + 2.0 * f) * g * g, sign * (1.0 + 2.0 * g) * f * f
-                    h0, h1 = sign * step * f * g * g, -sign * step * f * f * g
-                    for c in range(channels):
-                        total[c, j] += (
-                            w0 * tables[b, k, c]
-                            + w1 * tables[b, k + 1, c]
-                            + h0 * slopes[b, k, c]
-                            + h1 * slopes[b, k + 1, c]
-                        )
+        for b in range(spikes.angle.shape[0]):
+            _add_outside_table(spikes, b, x32, np.float32(y[i]), far, flat, near)
+            _add_from_table(spikes, b, x, y[i], near, total)
         for j in range(width):
             r2 = x[j] * x[j] + y[i] * y[i]
             w = 1.0
@@ -289,4 +239,99 @@ def blend_blade_wings(
             for c in range(channels):
                 out[i, j, c] = (1.0 - w) * out[i, j, c] + share * (
                     total[c, j] + far[j] * tail[c] + flat[j] * half_total[c]
+                )
+
+
+@inlined
+def _least_half(spikes):
+    """Return the least half width of a fan in v.
+
+    A straight blade has no fan: the cumulative profile is differenced over a quarter step each way to give its slope.
+    """
+    return 0.25 * spikes.step
+
+
+@borrowing
+def _add_outside_table(spikes, b, x, y, far, flat, near):
+    """Add one blade's light to a row of pixels by closed forms that all channels share: beside the fan, deep inside it.
+
+    Parameters
+    ----------
+    spikes : SpikeTables
+    b : int
+    x : ndarray, shape (W,), float32
+    y : float32
+    far, flat : ndarray, shape (W,), float32
+        Added to: factors of `tail` and of `half_total`.
+    near : ndarray, shape (W,), uint8
+        Filled: 1 where the table is needed.
+    """
+    zero, one = np.float32(0.0), np.float32(1.0)
+    nx, ny = np.float32(math.cos(spikes.angle[b])), np.float32(math.sin(spikes.angle[b]))
+    cos_fan, sin_fan = np.float32(math.cos(spikes.half_fan)), np.float32(math.sin(spikes.half_fan))
+    scale, fan = np.float32(spikes.scale), np.float32(spikes.half_fan)
+    end, least = np.float32((spikes.cumulative.shape[1] - 2) * spikes.step), np.float32(_least_half(spikes))
+    for j in range(x.shape[0]):
+        r = math.sqrt(x[j] * x[j] + y * y)
+        along, across = abs(nx * x[j] + ny * y), abs(nx * y - ny * x[j])
+        N, D = across * cos_fan - along * sin_fan, along * cos_fan + across * sin_fan
+        wide = r * fan * scale
+        wide = wide if wide > least else least
+        v = r * scale * (fan * D + N)
+        # half_fan - theta is its sine, -N / r, to a few percent of a term that is itself a few per mille
+        depth = -N * scale
+        beside, inside = v > (end + wide) * D, depth > end
+        # within the table `depth` may be 0: divide 0 by 1
+        over = v * v - wide * wide * D * D if beside else depth * (depth - wide - wide) if inside else one
+        far[j] += (D * D if beside else one if inside else zero) / over
+        flat[j] += (one if inside else zero) / wide
+        near[j] = 0 if beside or inside else 1
+
+
+@borrowing
+def _add_from_table(spikes, b, x, y, near, total):
+    """Add one blade's light where its profile is tabulated, from one side of the fan to the other.
+
+    Parameters
+    ----------
+    spikes : SpikeTables
+    b : int
+    x : ndarray, shape (W,)
+    y : float
+    near : ndarray, shape (W,), uint8
+        From `_add_outside_table`.
+    total : ndarray, shape (C, W)
+        Irradiance times r^2, added to.
+    """
+    half_fan, scale, step = spikes.half_fan, spikes.scale, spikes.step
+    tables, slopes, half_total, tail = spikes.cumulative, spikes.slopes, spikes.half_total, spikes.tail
+    nx, ny = math.cos(spikes.angle[b]), math.sin(spikes.angle[b])
+    cos_fan, sin_fan = math.cos(half_fan), math.sin(half_fan)
+    per_step, least = 1.0 / step, _least_half(spikes)
+    for j in range(x.shape[0]):
+        if not near[j]:
+            continue
+        r = math.sqrt(x[j] * x[j] + y * y)
+        along, across = abs(nx * x[j] + ny * y), abs(nx * y - ny * x[j])
+        N, D = across * cos_fan - along * sin_fan, along * cos_fan + across * sin_fan
+        half = max(r * half_fan * scale, least)
+        theta = half_fan + N / D if N > 0.0 else math.atan2(across, along)
+        v = r * theta * scale
+        for side in range(2):
+            at = v + half if side == 0 else v - half
+            sign = (1.0 if at >= 0.0 else -1.0) * (0.5 - side) / half
+            at = abs(at)
+            k = int(at * per_step)
+            if k >= tables.shape[1] - 1:
+                for c in range(total.shape[0]):
+                    total[c, j] += sign * (half_total[c] - tail[c] / at)
+                continue
+            # a Hermite cubic in the table
+            f = at * per_step - k
+            g = 1.0 - f
+            w0, w1 = sign * (1.0 + 2.0 * f) * g * g, sign * (1.0 + 2.0 * g) * f * f
+            h0, h1 = sign * step * f * g * g, -sign * step * f * f * g
+            for c in range(total.shape[0]):
+                total[c, j] += (
+                    w0 * tables[b, k, c] + w1 * tables[b, k + 1, c] + h0 * slopes[b, k, c] + h1 * slopes[b, k + 1, c]
                 )

@@ -1,7 +1,12 @@
 """Draw a ray bundle whose light is multiplied by diffraction patterns in the stop plane instead of cut by the iris."""
 
+from __future__ import annotations
+
+from typing import NamedTuple
+
 import numpy as np
 
+from ...typing import Floats, Indices, Pixels
 from ..jit.decorators import borrowing, compiled
 from ..raster.bundle import (
     SLIVER,
@@ -46,138 +51,241 @@ from ..tracing.sequential import STOP_X
 _CELL_NODES = 9
 
 
+class StopPatterns(NamedTuple):
+    """The diffraction patterns of a path in the stop plane.
+
+    Attributes
+    ----------
+    values : ndarray, shape (P,), float32
+        Pictures of the stop, each 0 along its border and with the lowest row first; tables of corners and edges.
+    table : ndarray, shape (C, TABLE_COLUMNS)
+        Location of the pattern of each crossing of the stop in `values` (`kernels.raster.stop_pattern`).
+    corners : ndarray, shape (J, 2)
+        Directions of the corners of the iris.
+    """
+
+    values: Pixels
+    table: Floats
+    corners: Floats
+
+
+class _Bundle(NamedTuple):
+    """A bundle (`kernels.raster.bundle.draw_bundle`) or its mirror image, and what is known of its nodes.
+
+    Attributes
+    ----------
+    data, pupil, triangles, densities
+        As in `draw_bundle`.
+    spots, blocked : ndarray, shape (N, 2) and (N,)
+        From `_place_nodes`.
+    deep : ndarray, shape (N,), bool
+        From `_find_deep`.
+    mirror : float
+        1, or -1 for the mirror image.
+    """
+
+    data: Floats
+    pupil: Floats
+    triangles: Indices
+    densities: Floats
+    spots: Floats
+    blocked: Indices
+    deep: Floats
+    mirror: float
+
+
+class _Target(NamedTuple):
+    """Where a bundle is drawn: `axes`, `to_pixels`, `gain`, `rgb` and `plane` of `draw_bundle`."""
+
+    axes: Floats
+    to_pixels: Floats
+    gain: float
+    rgb: Floats
+    plane: Floats
+
+
+class _Room(NamedTuple):
+    """Working arrays: polygons and their values, a triangle's corners, and places in the stop.
+
+    Attributes
+    ----------
+    polygon, other : ndarray, shape (MAX_VERTICES, PSTOP + 2 C)
+    values : ndarray, shape (MAX_VERTICES,)
+    corner : ndarray, shape (3, 3)
+        Column, row and density of a triangle's corners.
+    stops : ndarray, shape (C, _CELL_NODES, 2)
+        Places in the stop of the nodes of a cell or a triangle.
+    no_blades : ndarray, shape (0, 4)
+    """
+
+    polygon: Floats
+    other: Floats
+    values: Floats
+    corner: Floats
+    stops: Floats
+    no_blades: Floats
+
+
 @compiled
-def draw_ringing(
-    data, pupil, triangles, densities, crossings, patterns, table, corners, axes, to_pixels, gain, rgb, plane, halves,
-):  # fmt: skip
+def draw_ringing(data, pupil, triangles, densities, patterns, axes, to_pixels, gain, rgb, plane, halves):
     """Add a bundle, and its mirror image where it has one, to a picture, with its light multiplied by patterns.
 
     Parameters
     ----------
-    data, pupil, triangles, densities, crossings, axes, to_pixels, gain, rgb, plane, halves
+    data, pupil, triangles, densities, axes, to_pixels, gain, rgb, plane, halves
         As in `kernels.raster.bundle.draw_bundle`.
-    patterns : ndarray, shape (P,), float32
-        Pictures of the stop, each 0 along its border and with the lowest row first; tables of corners and edges.
-    table : ndarray, shape (C, TABLE_COLUMNS)
-        Location of the pattern of each crossing of the stop in `patterns` (`kernels.raster.stop_pattern`).
-    corners : ndarray, shape (J, 2)
-        Directions of the corners of the iris.
+    patterns : StopPatterns
 
     Notes
     -----
     Rims cut geometrically. Patterns are sampled at pixel centres, so they must be smooth over a pixel. As in
     `draw_bundle`, a cell is drawn as one polygon if its density and its places in the stop are nearly linear.
     """
-    height, width = plane_size(plane)
+    _, width = plane_size(plane)
+    crossings = patterns.table.shape[0]
     columns = PSTOP + 2 * crossings
-    polygon, other = np.empty((MAX_VERTICES, columns)), np.empty((MAX_VERTICES, columns))
-    values = np.empty(MAX_VERTICES)
-    corner, stops = np.empty((3, 3)), np.empty((crossings, _CELL_NODES, 2))
+    room = _Room(
+        np.empty((MAX_VERTICES, columns)), np.empty((MAX_VERTICES, columns)), np.empty(MAX_VERTICES), np.empty((3, 3)),
+        np.empty((crossings, _CELL_NODES, 2)), np.empty((0, 4)),
+    )  # fmt: skip
     spots, blocked = np.empty((pupil.shape[0], 2)), np.empty(pupil.shape[0], dtype=np.int64)
     deep = np.empty(pupil.shape[0], dtype=np.bool_)
-    no_blades = np.empty((0, 4))
     places, light, where, beside, below = room_to_weave(crossings, width)
-    texture = patterns, table, corners, places, light, where, beside, below
-    # an int literal has another type and would compile the callees a second time
-    three = np.int64(3)
-    pixel_area = to_pixels[2] * to_pixels[3]
+    texture = patterns.values, patterns.table, patterns.corners, places, light, where, beside, below
+    target = _Target(axes, to_pixels, gain, rgb, plane)
     for half in range(halves):
         mirror = 1.0 - 2.0 * half
-        _place_nodes(data, mirror, crossings, no_blades, axes, to_pixels, spots, blocked)
-        _find_deep(data, crossings, table, deep)
+        _place_nodes(data, mirror, crossings, room.no_blades, axes, to_pixels, spots, blocked)
+        _find_deep(data, crossings, patterns.table, deep)
+        bundle = _Bundle(data, pupil, triangles, densities, spots, blocked, deep, mirror)
         start = np.int64(0)
         while start < triangles.shape[0]:
             end = start + 1
             while end < triangles.shape[0] and triangles[end, 0] == triangles[start, 0]:
                 end += 1
-            if end - start >= 4:
-                count = _gather_cell(spots, blocked, triangles, start, end, width, height, polygon)
-                if count > 0:
-                    inside = deep[triangles[start, 0]]
-                    for t in range(start, end):
-                        inside = inside and deep[triangles[t, 1]]
-                    if not inside:
-                        _gather_stops(data, triangles, start, end, mirror, axes, stops)
-                        dark = False
-                        for k in range(crossings):
-                            dark = dark or is_dark(table, corners, k, stops[k], count + 1)
-                        if dark:
-                            start = end
-                            continue
-                    flux, area = 0.0, 0.0
-                    for t in range(start, end):
-                        part, spread = _triangle_flux(data, pupil, triangles[t, 0], triangles[t, 1], triangles[t, 2])
-                        flux += part * gain
-                        area += spread
-                    drawn = abs(area) * pixel_area
-                    fits, base, gx, gy, low, high = _plane_over_cell(
-                        spots, densities, triangles, start, end, flux / drawn, gain / pixel_area, drawn
-                    )
-                    for k in range(crossings):
-                        places[k, WAY] = OPEN
-                    if fits and not inside:
-                        fits = _places_over_cell(spots, triangles, start, end, stops, table, corners, places)
-                    if fits:
-                        fill_polygon(polygon, count, base, gx, gy, low, high, rgb, plane, texture)
-                        start = end
-                        continue
-            for t in range(start, end):
-                a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-                if min(blocked[a], blocked[b], blocked[c]) < 0 or blocked[a] & blocked[b] & blocked[c] != 0:
-                    continue
-                left, right = min(spots[a, 0], spots[b, 0], spots[c, 0]), max(spots[a, 0], spots[b, 0], spots[c, 0])
-                top, bottom = min(spots[a, 1], spots[b, 1], spots[c, 1]), max(spots[a, 1], spots[b, 1], spots[c, 1])
-                if right <= 0.0 or left >= width or bottom <= 0.0 or top >= height:
-                    continue
-                _place_in_stop(data, triangles, t, mirror, axes, stops)
-                dark = False
-                for k in range(crossings):
-                    dark = dark or is_dark(table, corners, k, stops[k], three)
-                if dark:
-                    continue
-                flux, area = _triangle_flux(data, pupil, a, b, c)
-                flux *= gain
-                whole = blocked[a] | blocked[b] | blocked[c] == 0
-                drawn = abs(area) * pixel_area
-                inside = left >= 0.0 and top >= 0.0 and int(left) == int(right) and int(top) == int(bottom)
-                if (whole and inside) or drawn < SLIVER:
-                    for k in range(crossings):
-                        x = (stops[k, 0, 0] + stops[k, 1, 0] + stops[k, 2, 0]) / 3.0
-                        y = (stops[k, 0, 1] + stops[k, 1, 1] + stops[k, 2, 1]) / 3.0
-                        flux *= pattern_value(patterns, table, corners, k, x, y)
-                    if whole and inside:
-                        add_to_pixel(plane, int(top), int(left), flux, rgb)
-                        continue
-                count = 3
-                if whole:
-                    for m in range(3):
-                        polygon[m, PX], polygon[m, PY] = spots[triangles[t, m], 0], spots[triangles[t, m], 1]
-                else:
-                    count = clip_triangle(
-                        data, pupil, triangles[t], mirror, crossings, no_blades, axes, polygon, other, values
-                    )
-                    if count == 0:
-                        continue
-                    for k in range(count):
-                        x, y = polygon[k, PX], polygon[k, PY]
-                        polygon[k, PX] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
-                        polygon[k, PY] = to_pixels[1] + to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
-                if drawn < SLIVER:
-                    if not whole:
-                        flux *= abs(polygon_area(polygon, count, PP, PQ)) / _pupil_area(pupil, a, b, c)
-                    _splat_polygon(polygon, count, flux, rgb, plane)
-                    continue
-                for m in range(3):
-                    k = triangles[t, m]
-                    corner[m, 0], corner[m, 1], corner[m, 2] = spots[k, 0], spots[k, 1], densities[k]
-                _places_over_triangle(corner, stops, table, corners, places)
-                base, gx, gy, low, high = _plane_through(corner, flux / drawn, gain / pixel_area, drawn)
-                if left < 0.0 or right > width or top < 0.0 or bottom > height:
-                    count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
-                    if count < 3:
-                        continue
-                fill_polygon(polygon, count, base, gx, gy, low, high, rgb, plane, texture)
+            if end - start < 4 or not _draw_cell(bundle, start, end, texture, target, room):
+                for t in range(start, end):
+                    _draw_triangle(bundle, t, texture, target, room)
             start = end
+
+
+@borrowing
+def _draw_cell(bundle, start, end, texture, target, room):
+    """Draw the triangles around a node as one polygon; return False if they must be drawn one by one.
+
+    A dark cell counts as drawn.
+    """
+    _, table, corners, places = texture[:4]
+    data, triangles, spots = bundle.data, bundle.triangles, bundle.spots
+    height, width = plane_size(target.plane)
+    count = _gather_cell(spots, bundle.blocked, triangles, start, end, width, height, room.polygon)
+    if count <= 0:
+        return False
+    inside = bundle.deep[triangles[start, 0]]
+    for t in range(start, end):
+        inside = inside and bundle.deep[triangles[t, 1]]
+    if not inside:
+        _gather_stops(data, triangles, start, end, bundle.mirror, target.axes, room.stops)
+        if _is_dark_anywhere(table, corners, room.stops, count + 1):
+            return True
+    flux, area = 0.0, 0.0
+    for t in range(start, end):
+        part, spread = _triangle_flux(data, bundle.pupil, triangles[t, 0], triangles[t, 1], triangles[t, 2])
+        flux += part * target.gain
+        area += spread
+    pixel_area = target.to_pixels[2] * target.to_pixels[3]
+    drawn = abs(area) * pixel_area
+    fits, base, gx, gy, low, high = _plane_over_cell(
+        spots, bundle.densities, triangles, start, end, flux / drawn, target.gain / pixel_area, drawn
+    )
+    for k in range(table.shape[0]):
+        places[k, WAY] = OPEN
+    if fits and not inside:
+        fits = _places_over_cell(spots, triangles, start, end, room.stops, table, corners, places)
+    if fits:
+        fill_polygon(room.polygon, count, base, gx, gy, low, high, target.rgb, target.plane, texture)
+    return fits
+
+
+@borrowing
+def _draw_triangle(bundle, t, texture, target, room):
+    """Draw one triangle of a bundle."""
+    values, table, corners, places = texture[:4]
+    data, pupil, triangles, spots, blocked = bundle.data, bundle.pupil, bundle.triangles, bundle.spots, bundle.blocked
+    polygon, corner, stops = room.polygon, room.corner, room.stops
+    height, width = plane_size(target.plane)
+    a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+    if min(blocked[a], blocked[b], blocked[c]) < 0 or blocked[a] & blocked[b] & blocked[c] != 0:
+        return
+    left, right = min(spots[a, 0], spots[b, 0], spots[c, 0]), max(spots[a, 0], spots[b, 0], spots[c, 0])
+    top, bottom = min(spots[a, 1], spots[b, 1], spots[c, 1]), max(spots[a, 1], spots[b, 1], spots[c, 1])
+    if right <= 0.0 or left >= width or bottom <= 0.0 or top >= height:
+        return
+    _place_in_stop(data, triangles, t, bundle.mirror, target.axes, stops)
+    # an int literal has another type and would compile the callees a second time
+    if _is_dark_anywhere(table, corners, stops, np.int64(3)):
+        return
+    flux, area = _triangle_flux(data, pupil, a, b, c)
+    flux *= target.gain
+    whole = blocked[a] | blocked[b] | blocked[c] == 0
+    pixel_area = target.to_pixels[2] * target.to_pixels[3]
+    drawn = abs(area) * pixel_area
+    inside = left >= 0.0 and top >= 0.0 and int(left) == int(right) and int(top) == int(bottom)
+    if (whole and inside) or drawn < SLIVER:
+        for k in range(table.shape[0]):
+            x = (stops[k, 0, 0] + stops[k, 1, 0] + stops[k, 2, 0]) / 3.0
+            y = (stops[k, 0, 1] + stops[k, 1, 1] + stops[k, 2, 1]) / 3.0
+            flux *= pattern_value(values, table, corners, k, x, y)
+        if whole and inside:
+            add_to_pixel(target.plane, int(top), int(left), flux, target.rgb)
+            return
+    count = _outline_of_triangle(bundle, t, whole, table.shape[0], target, room)
+    if count == 0:
+        return
+    if drawn < SLIVER:
+        if not whole:
+            flux *= abs(polygon_area(polygon, count, PP, PQ)) / _pupil_area(pupil, a, b, c)
+        _splat_polygon(polygon, count, flux, target.rgb, target.plane)
+        return
+    for m in range(3):
+        k = triangles[t, m]
+        corner[m, 0], corner[m, 1], corner[m, 2] = spots[k, 0], spots[k, 1], bundle.densities[k]
+    _places_over_triangle(corner, stops, table, corners, places)
+    base, gx, gy, low, high = _plane_through(corner, flux / drawn, target.gain / pixel_area, drawn)
+    if left < 0.0 or right > width or top < 0.0 or bottom > height:
+        count = cut_to_rectangle(polygon, count, room.other, room.values, float(width), float(height))
+        if count < 3:
+            return
+    fill_polygon(polygon, count, base, gx, gy, low, high, target.rgb, target.plane, texture)
+
+
+@borrowing
+def _outline_of_triangle(bundle, t, whole, crossings, target, room):
+    """Fill the polygon with what the rims leave of a triangle, in pixels; return its number of vertices."""
+    polygon, axes, to_pixels = room.polygon, target.axes, target.to_pixels
+    if whole:
+        for m in range(3):
+            k = bundle.triangles[t, m]
+            polygon[m, PX], polygon[m, PY] = bundle.spots[k, 0], bundle.spots[k, 1]
+        return np.int64(3)
+    count = clip_triangle(
+        bundle.data, bundle.pupil, bundle.triangles[t], bundle.mirror, crossings, room.no_blades, axes, polygon,
+        room.other, room.values,
+    )  # fmt: skip
+    for k in range(count):
+        x, y = polygon[k, PX], polygon[k, PY]
+        polygon[k, PX] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
+        polygon[k, PY] = to_pixels[1] + to_pixels[3] * (x * axes[0, 1] + y * axes[1, 1])
+    return count
+
+
+@borrowing
+def _is_dark_anywhere(table, corners, stops, count):
+    """Return whether any crossing's pattern is dark at the first `count` places in the stop."""
+    dark = False
+    for k in range(table.shape[0]):
+        dark = dark or is_dark(table, corners, k, stops[k], count)
+    return dark
 
 
 @borrowing

@@ -7,6 +7,7 @@ rest is smooth and needs only coarse samples. Patterns without a closed form are
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -62,34 +63,49 @@ def _add_near(profile, b, step, far, share, gains, m, out, i, j):
         out[i, j, c] += gains[m, c] * (lower * profile[b, k, c] + upper * profile[b, k + 1, c])
 
 
+class StarSet(NamedTuple):
+    """Many starbursts that differ in place and colour.
+
+    Attributes
+    ----------
+    look : ndarray, shape (LOOK,)
+        Parameters, by the columns above.
+    normals : ndarray, shape (B, 2)
+        Normals of straight blades; none for a round opening.
+    profile : ndarray, shape (B, V, 3)
+        Irradiance times r^2 across each spike at v = k * step.
+    tail : ndarray, shape (3,)
+        Irradiance times r^2 beyond the profile is tail / v^2.
+    fan : ndarray, shape (3,)
+        Irradiance times r^3 of a round opening.
+    centres : ndarray, shape (L, 2)
+        x to the right and y up, mm.
+    gains : ndarray, shape (L, 3)
+        Factors of each starburst's channels.
+    """
+
+    look: Floats
+    normals: Floats
+    profile: Floats
+    tail: Floats
+    fan: Floats
+    centres: Floats
+    gains: Floats
+
+
 @compiled
-def add_coarse_wings(
-    look: Floats, normals: Floats, profile: Floats, tail: Floats, fan: Floats, centres: Floats, gains: Floats,
-    x: Floats, y: Floats, out: Floats,
-) -> None:  # fmt: skip
+def add_coarse_wings(stars: StarSet, x: Floats, y: Floats, out: Floats) -> None:
     """Add the smooth part of many starbursts, at coarse samples.
 
     Parameters
     ----------
-    look : (LOOK,) float64
-        Parameters, by the columns above.
-    normals : (B, 2) float64
-        Normals of straight blades; none for a round opening.
-    profile : (B, V, 3) float64
-        Irradiance times r^2 across each spike at v = k * step.
-    tail : (3,) float64
-        Irradiance times r^2 beyond the profile is tail / v^2.
-    fan : (3,) float64
-        Irradiance times r^3 of a round opening.
-    centres : (L, 2) float64
-        x to the right and y up, mm.
-    gains : (L, 3) float64
-        Factors of each starburst's channels.
+    stars : StarSet
     x, y : (W,), (H,) float64
         Samples, mm.
     out : (H, W, 3) float64
         Irradiance, added to.
     """
+    look, normals, profile, tail, fan, centres, gains = stars
     scale, step, area = look[SCALE], look[STEP], look[PIXEL_X] * look[PIXEL_X] + look[PIXEL_Y] * look[PIXEL_Y]
     spike_in, by_spike = look[SPIKE_IN], 1.0 / (look[SPIKE_OUT] - look[SPIKE_IN])
     disc_in, by_disc = look[DISC_IN], 1.0 / (look[DISC_OUT] - look[DISC_IN])
@@ -158,16 +174,12 @@ def _on_spike(look, nx, ny, y, start, count):
 
 
 @compiled
-def add_sharp_wings(
-    look: Floats, normals: Floats, profile: Floats, tail: Floats, fan: Floats, centres: Floats, gains: Floats,
-    windows: Indices, x: Floats, y: Floats, first_row: int, out: Pixels,
-) -> None:  # fmt: skip
+def add_sharp_wings(stars: StarSet, windows: Indices, x: Floats, y: Floats, first_row: int, out: Pixels) -> None:
     """Add the sharp part of the starbursts, which `add_coarse_wings` leaves out, pixel by pixel.
 
     Parameters
     ----------
-    look ... gains
-        As in `add_coarse_wings`.
+    stars : StarSet
     windows : (L, 4) int64
         Columns and rows (first, one past the last) around each centre that are left out: the caller fills them.
     x, y : (W,), (H,) float64
@@ -177,6 +189,7 @@ def add_sharp_wings(
     out : (H, W, 3) float32
         Irradiance, added to.
     """
+    look, normals, profile, tail, fan, centres, gains = stars
     count, step, scale = x.size, look[STEP], look[SCALE]
     area = look[PIXEL_X] * look[PIXEL_X] + look[PIXEL_Y] * look[PIXEL_Y]
     spike_in, by_spike = look[SPIKE_IN], 1.0 / (look[SPIKE_OUT] - look[SPIKE_IN])

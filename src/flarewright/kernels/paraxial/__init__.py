@@ -2,6 +2,7 @@
 
 - `ghosts`: `path_matrices`; `draw_matrix_ghosts` and `measure_matrix_ghosts` for many paths; `matrix_squares`, the
   angles of incidence
+- `arguments`: named tuples that these take: `PathList`, `MeridianLens`, `EntranceLight`, `StopOutline`, `SensorFrame`
 - `iris_images`: `close_ring`, `cut_ring`, the entrance cut by the images of the iris
 - `path_reflectance`: `path_throughput`, spectral throughput of paths
 """

@@ -1,14 +1,19 @@
 """Paraxial ghosts: ray transfer matrices along a path, and ghosts drawn from them."""
 
+from __future__ import annotations
+
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
+from ...typing import Floats, Indices
 from ..jit.decorators import borrowing, compiled, inner
 from ..raster.iris_mask import fill_through_mask, mask_texture
 from ..raster.polygons import fill_polygon
 from ..tracing.clip import MAX_VERTICES, PP, PQ, PREL, PSTOP, PW, PX, PY, cut_to_rectangle, polygon_area
 from ..tracing.sequential import REFLECT, STOP
+from .arguments import MeridianLens
 from .iris_images import close_ring, cut_ring
 
 # edges of the polygon that approximates the round rim of the entrance
@@ -145,14 +150,14 @@ def paraxial_weight(rows, actions, reflectance, squares):
 
 
 @inner
-def _meridians(rows, actions, curvature, curvature_x, z_vertex, n_gap, sensor_z, nearness, crossings, to_stop, across):
+def _meridians(rows, actions, lens, curvature_x, nearness, crossings, to_stop, across):
     """Fill the matrices to the stop in the y and the x plane; return a and b of the whole path in each."""
-    a, b, _, _ = path_matrices(rows, actions, curvature, z_vertex, n_gap, sensor_z, to_stop)
+    a, b, _, _ = path_matrices(rows, actions, lens.curvature, lens.z_vertex, lens.n_gap, lens.sensor_z, to_stop)
     # the rays of a near light diverge: their slope grows with their height
     a += nearness * b
     ax, bx = a, b
     if curvature_x is not None:
-        ax, bx, _, _ = path_matrices(rows, actions, curvature_x, z_vertex, n_gap, sensor_z, across)
+        ax, bx, _, _ = path_matrices(rows, actions, curvature_x, lens.z_vertex, lens.n_gap, lens.sensor_z, across)
         ax += nearness * bx
     for c in range(crossings):
         to_stop[c, 0, 0] += nearness * to_stop[c, 0, 1]
@@ -161,74 +166,58 @@ def _meridians(rows, actions, curvature, curvature_x, z_vertex, n_gap, sensor_z,
     return a, b, ax, bx
 
 
+@inner
+def _fill_sines(rows, actions, lens, curvature_x, light, iris_radius, to_stop, across, squares):
+    """Fill the angles of incidence of the ray that gives a ghost's colour (`paraxial_sines`)."""
+    centre = _centre(to_stop, light.slope, iris_radius, light.semi)
+    beside = 0.0 if curvature_x is None else _centre(across, light.slope_x, iris_radius, light.semi)
+    paraxial_sines(
+        rows, actions, lens.curvature, curvature_x, lens.z_vertex, lens.n_gap,
+        centre, light.slope + light.nearness * centre, beside, light.slope_x + light.nearness * beside, squares,
+    )  # fmt: skip
+
+
 @compiled
-def matrix_squares(
-    rows, actions, starts, crossings, curvature, curvature_x, z_vertex, n_gap, sensor_z,
-    entrance, slope, slope_x, nearness, iris_radius, squares,
-):  # fmt: skip
+def matrix_squares(paths, lens, curvature_x, light, iris_radius, squares):
     """Compute the angles of incidence of the rays from which `draw_matrix_ghosts` takes the ghosts' colours.
 
     Parameters
     ----------
-    rows, actions, starts, crossings, curvature, curvature_x, z_vertex
+    paths : PathList
+    lens : MeridianLens
+        At one wavelength.
+    curvature_x, light
         As in `draw_matrix_ghosts`.
-    n_gap : ndarray, shape (K + 1,)
-    sensor_z, entrance, slope, slope_x, nearness, iris_radius : float
-        As in `draw_matrix_ghosts`.
+    iris_radius : float
     squares : ndarray, shape (steps,)
         Filled with the squared sine on the lower-index side at each step of each path (`paraxial_sines`).
     """
     to_stop = np.empty((MOST_CROSSINGS, 2, 2))
     across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
-    for p in range(starts.size - 1):
-        path_rows, path_actions = rows[starts[p] : starts[p + 1]], actions[starts[p] : starts[p + 1]]
-        _meridians(
-            path_rows, path_actions, curvature, curvature_x, z_vertex, n_gap, sensor_z, nearness, crossings[p],
-            to_stop, across,
-        )  # fmt: skip
-        centre = _centre(to_stop, slope, iris_radius, entrance)
-        beside = 0.0 if curvature_x is None else _centre(across, slope_x, iris_radius, entrance)
-        paraxial_sines(
-            path_rows, path_actions, curvature, curvature_x, z_vertex, n_gap,
-            centre, slope + nearness * centre, beside, slope_x + nearness * beside, squares[starts[p] : starts[p + 1]],
-        )  # fmt: skip
+    for p in range(paths.starts.size - 1):
+        first, end = paths.starts[p], paths.starts[p + 1]
+        rows, actions = paths.rows[first:end], paths.actions[first:end]
+        _meridians(rows, actions, lens, curvature_x, light.nearness, paths.crossings[p], to_stop, across)
+        _fill_sines(rows, actions, lens, curvature_x, light, iris_radius, to_stop, across, squares[first:end])
 
 
 @compiled
-def draw_matrix_ghosts(
-    rows, actions, starts, crossings, curvature, curvature_x, z_vertex, n_gap, reflectance, sensor_z,
-    entrance, slope, slope_x, nearness, edges, iris_radius, mask, axes, to_pixels, gain, rgb, plane,
-):  # fmt: skip
+def draw_matrix_ghosts(paths, lens, curvature_x, light, iris, mask, frame, rgb, plane):
     """Draw the ghosts of many paths at many wavelengths by matrices (Lee and Eisemann 2013; Van Acoleyen 2025, ch. 4).
 
     Parameters
     ----------
-    rows, actions : ndarray, int64
-        The steps of all paths, one after another.
-    starts : ndarray, shape (P + 1,), int64
-        Index of the first step of each path.
-    crossings : ndarray, shape (P,), int64
-        Number of stop crossings of each path.
-    curvature, z_vertex : ndarray, shape (K,)
+    paths : PathList
+    lens : MeridianLens
+        At W wavelengths.
     curvature_x : ndarray, shape (K,), or None
         Curvatures in the x plane if some row's differ; the frame is then that of the lens instead of the meridional
         one.
-    n_gap : ndarray, shape (W, K + 1)
-    reflectance : ndarray, shape (W, K, M)
-    sensor_z : float
-    entrance : float
-        Semi-diameter of the first surface, mm.
-    slope : float
-        Slope of the rays in the y plane.
-    slope_x : float
-        Slope in the x plane; 0 in the meridional frame.
-    nearness : float
-        1 / distance along the axis from the light to the first vertex, 1/mm; 0 for a distant light.
-    edges : ndarray, shape (B, 4)
-        The iris as straight blades.
-    iris_radius : float
-    mask, axes, to_pixels, gain
-        As in `draw_bundle`.
+    light : EntranceLight
+    iris : StopOutline
+    mask
+        As in `kernels.raster.bundle.draw_bundle`.
+    frame : SensorFrame
     rgb : ndarray, shape (P, W, 3)
     plane : ndarray, shape (H, W, 3), float64
         Differences of flux along the rows, added to (`kernels.raster.polygons.sum_rows`).
@@ -239,53 +228,41 @@ def draw_matrix_ghosts(
     ray, through the centre of the iris or, where the entrance bounds the ghost, of the entrance.
     """
     height, width = plane.shape[0], plane.shape[1]
-    polygon, other = np.zeros((MAX_VERTICES, PSTOP + 6)), np.zeros((MAX_VERTICES, PSTOP + 6))
     values = np.empty(MAX_VERTICES)
-    squares = np.empty(rows.size)
-    to_stop = np.empty((MOST_CROSSINGS, 2, 2))
-    across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
-    rim = _rim(entrance, RIM)
-    spots, ring = _outline(RIM, edges)
+    other = np.zeros((MAX_VERTICES, PSTOP + 6))
+    work = _room_for_ghosts(paths, light, iris, curvature_x, RIM)
     if mask is not None:
         texture = mask_texture(mask, MOST_CROSSINGS, width)
         corner, stops = np.empty((3, 2)), np.empty((MOST_CROSSINGS, 3, 2))
-    for p in range(starts.size - 1):
-        path_rows, path_actions = rows[starts[p] : starts[p + 1]], actions[starts[p] : starts[p + 1]]
-        for w in range(n_gap.shape[0]):
-            count, even = _place_ghost(
-                path_rows, path_actions, crossings[p], curvature, curvature_x, z_vertex, n_gap[w], reflectance[w],
-                sensor_z, entrance, slope, slope_x, nearness, edges, iris_radius, axes, to_pixels, rim, spots, ring,
-                polygon, squares, to_stop, across,
-            )  # fmt: skip
+    for p in range(paths.starts.size - 1):
+        crossings = paths.crossings[p]
+        for w in range(lens.n_gap.shape[0]):
+            count, even = _place_ghost(paths, p, _lens_at(lens, w), curvature_x, light, iris, frame, work)
             if count == 0:
                 continue
-            even *= gain
+            even *= frame.gain
             if mask is not None:
-                _take_corners(polygon, count, crossings[p], corner, stops)
+                _take_corners(work.polygon, count, crossings, corner, stops)
                 fill_through_mask(
-                    polygon, count, crossings[p], corner, stops, mask, texture, even, 0.0, 0.0, even, even, rgb[p, w],
+                    work.polygon, count, crossings, corner, stops, mask, texture, even, 0.0, 0.0, even, even, rgb[p, w],
                     plane, other, values,
                 )  # fmt: skip
                 continue
-            count = cut_to_rectangle(polygon, count, other, values, float(width), float(height))
+            count = cut_to_rectangle(work.polygon, count, other, values, float(width), float(height))
             if count >= 3:
-                fill_polygon(polygon, count, even, 0.0, 0.0, even, even, rgb[p, w], plane)
+                fill_polygon(work.polygon, count, even, 0.0, 0.0, even, even, rgb[p, w], plane)
 
 
 @compiled
-def measure_matrix_ghosts(
-    rows, actions, starts, crossings, curvature, curvature_x, z_vertex, n_gap, reflectance, sensor_z,
-    entrance, slope, slope_x, nearness, edges, iris_radius, axes, to_pixels, gain, width, height, sides, found,
-):  # fmt: skip
+def measure_matrix_ghosts(paths, lens, curvature_x, light, iris, frame, width, height, sides, found):
     """Compute the irradiance of the ghosts of `draw_matrix_ghosts` and their flux in the picture.
 
     Parameters
     ----------
-    rows ... z_vertex
-        As in `draw_matrix_ghosts`.
-    n_gap : ndarray, shape (K + 1,)
-    reflectance : ndarray, shape (K, M)
-    sensor_z ... gain
+    paths : PathList
+    lens : MeridianLens
+        At one wavelength.
+    curvature_x, light, iris, frame
         As in `draw_matrix_ghosts`.
     width, height : float
         Pixels.
@@ -294,50 +271,76 @@ def measure_matrix_ghosts(
     found : ndarray, shape (P, 2)
         Filled with the flux inside the picture and the flux per pixel inside the ghost.
     """
-    polygon, other = np.zeros((MAX_VERTICES, PSTOP + 6)), np.zeros((MAX_VERTICES, PSTOP + 6))
     values = np.empty(MAX_VERTICES)
-    squares = np.empty(rows.size)
-    to_stop = np.empty((MOST_CROSSINGS, 2, 2))
-    across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
-    rim = _rim(entrance, sides)
-    spots, ring = _outline(sides, edges)
-    for p in range(starts.size - 1):
+    other = np.zeros((MAX_VERTICES, PSTOP + 6))
+    work = _room_for_ghosts(paths, light, iris, curvature_x, sides)
+    for p in range(paths.starts.size - 1):
         found[p, 0] = found[p, 1] = 0.0
-        count, even = _place_ghost(
-            rows[starts[p] : starts[p + 1]], actions[starts[p] : starts[p + 1]], crossings[p], curvature, curvature_x,
-            z_vertex, n_gap, reflectance, sensor_z, entrance, slope, slope_x, nearness, edges, iris_radius, axes,
-            to_pixels, rim, spots, ring, polygon, squares, to_stop, across,
-        )  # fmt: skip
+        count, even = _place_ghost(paths, p, lens, curvature_x, light, iris, frame, work)
         if count > 0:
-            count = cut_to_rectangle(polygon, count, other, values, width, height)
+            count = cut_to_rectangle(work.polygon, count, other, values, width, height)
         if count >= 3:
-            found[p, 0] = gain * even * abs(polygon_area(polygon, count, PX, PY))
-            found[p, 1] = gain * even
+            found[p, 0] = frame.gain * even * abs(polygon_area(work.polygon, count, PX, PY))
+            found[p, 1] = frame.gain * even
+
+
+class _Room(NamedTuple):
+    """Working arrays for one ghost: its polygon and what leads to it.
+
+    Attributes
+    ----------
+    polygon : ndarray, shape (MAX_VERTICES, PSTOP + 6)
+    rim : ndarray, shape (sides, 2)
+        From `_rim`.
+    spots, ring : ndarray
+        From `_outline`.
+    squares : ndarray, shape (S,)
+        Squared sines at the steps of a path.
+    to_stop, across : ndarray, shape (MOST_CROSSINGS, 2, 2)
+        Matrices to the crossings of the stop in the y and the x plane; one array if the planes do not differ.
+    """
+
+    polygon: Floats
+    rim: Floats
+    spots: Floats
+    ring: Indices
+    squares: Floats
+    to_stop: Floats
+    across: Floats
 
 
 @inner
-def _place_ghost(
-    rows, actions, crossings, curvature, curvature_x, z_vertex, n_gap, reflectance, sensor_z, entrance, slope, slope_x,
-    nearness, edges, iris_radius, axes, to_pixels, rim, spots, ring, polygon, squares, to_stop, across,
-):  # fmt: skip
+def _room_for_ghosts(paths, light, iris, curvature_x, sides):
+    """Return the working arrays for the ghosts of some paths; `sides`: edges of the polygon of the entrance's rim."""
+    to_stop = np.empty((MOST_CROSSINGS, 2, 2))
+    across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
+    spots, ring = _outline(sides, iris.edges)
+    return _Room(
+        np.zeros((MAX_VERTICES, PSTOP + 6)), _rim(light.semi, sides), spots, ring, np.empty(paths.rows.size), to_stop,
+        across,
+    )  # fmt: skip
+
+
+@inner
+def _lens_at(lens, w):
+    """Return a lens of several wavelengths at one of them."""
+    return MeridianLens(lens.curvature, lens.z_vertex, lens.n_gap[w], lens.reflectance[w], lens.sensor_z)
+
+
+@inner
+def _place_ghost(paths, p, lens, curvature_x, light, iris, frame, work):
     """Fill a polygon with a ghost's outline in pixels; return its number of vertices and its flux per pixel."""
-    a, b, ax, bx = _meridians(
-        rows, actions, curvature, curvature_x, z_vertex, n_gap, sensor_z, nearness, crossings, to_stop, across
-    )
-    close_ring(rim, spots, ring)
-    head = _cut_by_iris(spots, ring, rim.shape[0], crossings, to_stop, across, slope, slope_x, axes, edges, entrance)
+    first, end = paths.starts[p], paths.starts[p + 1]
+    rows, actions, crossings = paths.rows[first:end], paths.actions[first:end], paths.crossings[p]
+    polygon, axes, to_pixels = work.polygon, frame.axes, frame.to_pixels
+    whole = _meridians(rows, actions, lens, curvature_x, light.nearness, crossings, work.to_stop, work.across)
+    close_ring(work.rim, work.spots, work.ring)
+    head = _cut_by_iris(work, crossings, light, axes, iris.edges)
     if head < 0:
         return np.int64(0), 0.0
-    count = _project_entrance(
-        polygon, spots, ring, head, slope, slope_x, a, b, ax, bx, to_stop, across, crossings, axes
-    )
-    centre = _centre(to_stop, slope, iris_radius, entrance)
-    beside = 0.0 if curvature_x is None else _centre(across, slope_x, iris_radius, entrance)
-    paraxial_sines(
-        rows, actions, curvature, curvature_x, z_vertex, n_gap,
-        centre, slope + nearness * centre, beside, slope_x + nearness * beside, squares,
-    )  # fmt: skip
-    flux = paraxial_weight(rows, actions, reflectance, squares) * abs(polygon_area(polygon, count, PP, PQ))
+    count = _project_entrance(work, head, light, whole, crossings, axes)
+    _fill_sines(rows, actions, lens, curvature_x, light, iris.radius, work.to_stop, work.across, work.squares)
+    flux = paraxial_weight(rows, actions, lens.reflectance, work.squares) * abs(polygon_area(polygon, count, PP, PQ))
     for k in range(count):
         x, y = polygon[k, PX], polygon[k, PY]
         polygon[k, PX] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
@@ -398,25 +401,32 @@ def _outline(sides, edges):
 
 
 @borrowing
-def _cut_by_iris(spots, ring, used, crossings, to_stop, across, slope, slope_x, axes, edges, entrance):
+def _cut_by_iris(work, crossings, light, axes, edges):
     """Cut the entrance by the images of the iris at each crossing; return a vertex of the rest, -1 if none is left."""
-    head = np.int64(0)
+    spots, ring, to_stop, across = work.spots, work.ring, work.to_stop, work.across
+    head, used = np.int64(0), work.rim.shape[0]
     for c in range(crossings):
         for e in range(edges.shape[0]):
             # the edge in the frame of the lens, and then in the entrance
             x = edges[e, 0] * axes[0, 0] + edges[e, 1] * axes[0, 1]
             y = edges[e, 0] * axes[1, 0] + edges[e, 1] * axes[1, 1]
             a, b = x * across[c, 0, 0], y * to_stop[c, 0, 0]
-            high = edges[e, 2] - x * across[c, 0, 1] * slope_x - y * to_stop[c, 0, 1] * slope
-            head, used = cut_ring(spots, ring, head, used, a, b, high, FLAT * entrance * (abs(a) + abs(b)))
+            high = edges[e, 2] - x * across[c, 0, 1] * light.slope_x - y * to_stop[c, 0, 1] * light.slope
+            head, used = cut_ring(spots, ring, head, used, a, b, high, FLAT * light.semi * (abs(a) + abs(b)))
             if head < 0:
                 return head
     return head
 
 
 @borrowing
-def _project_entrance(polygon, spots, ring, head, slope, slope_x, a, b, ax, bx, to_stop, across, crossings, axes):
-    """Fill a polygon with an outline in the entrance and its images on the sensor and at each crossing of the stop."""
+def _project_entrance(work, head, light, whole, crossings, axes):
+    """Fill a polygon with an outline in the entrance and its images on the sensor and at each crossing of the stop.
+
+    `whole` has a and b of the whole path in the y and the x plane (`_meridians`).
+    """
+    polygon, spots, ring, to_stop, across = work.polygon, work.spots, work.ring, work.to_stop, work.across
+    slope, slope_x = light.slope, light.slope_x
+    a, b, ax, bx = whole
     k, count = head, np.int64(0)
     while True:
         x, y = spots[k, 0], spots[k, 1]

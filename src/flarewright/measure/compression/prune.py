@@ -26,16 +26,16 @@ from ..fitting.detected_ghost import (
     CHANNELS,
     DetectedGhost,
     by_brightness,
+    channel_noise,
     exchange,
     isolated_views,
     leading,
-    noise_of,
     residual_of,
 )
 from ..fitting.ghost_fit import Fit, cost_of, refine
 from ..fitting.normal_equations import inverse
 from ..fitting.patches import patches_of
-from ..tracking.frame_fit import Measured, Shapes, halvings, measure_together
+from ..tracking.frame_fit import Measured, Shapes, frame_halvings, measure_together
 from ..tracking.smoothing_spline import smooth_curve
 from .order_selection import needed_numbers, parabola
 from .settings import CompressionSettings
@@ -133,10 +133,10 @@ def _with_fewer_numbers(
 ) -> list[DetectedGhost]:  # fmt: skip
     """Drop unneeded parameters and refit the others, each ghost against all others, brightest first."""
     out = list(ghosts)
-    rest, noise = [residual_of(out, views, m, pool) for m in range(CHANNELS)], noise_of(views)
+    rest, noise = [residual_of(out, views, m, pool) for m in range(CHANNELS)], channel_noise(views)
     for done, k in enumerate(by_brightness(out)):
         old = out[k]
-        new = steps.step(partial(_reduced, old, fitted_numbers(kept[k]), views, rest, noise, pool, settings))
+        new = steps.step(partial(_reduced, old, fitted_in_model(kept[k]), views, rest, noise, pool, settings))
         for m in range(CHANNELS):
             exchange(old.shapes[m], new.shapes[m], old, views, rest[m], pool)
         out[k] = new
@@ -146,7 +146,7 @@ def _with_fewer_numbers(
     return out
 
 
-def fitted_numbers(ghost: AberrationGhost) -> Indices:
+def fitted_in_model(ghost: AberrationGhost) -> Indices:
     """Return the fitted parameters of a ghost: those with a stored uncertainty, or all when none is stored."""
     known = np.flatnonzero(channel_deviation(ghost.green) > 0.0)
     return known.astype(np.int64) if known.size else free_numbers(2, len(ghost.green.discs), 2)
@@ -223,7 +223,7 @@ def curves_of(
     list of Curves
     """
     measurements: list[list[_Measurement]] = [[] for _ in ghosts]
-    times = halvings(views[0].size_px[0], settings.tracking.frame)
+    times = frame_halvings(views[0].size_px[0], settings.tracking.frame)
     factor = 2.0**times
     shapes = [_sized(ghost, 1.0 / factor) for ghost in ghosts]
     visible = [

@@ -14,6 +14,7 @@ arrays, the journal of finished steps, and the helpers for threads and memory. T
 - `parameters`: one colour of one ghost during a fit, and its free parameters (`Shape`, `free_numbers`, `stepped`)
 - `pose_curves`: brightness, shift and size of a ghost over the constellation (`Pose`, `posed`, `pose_at`)
 - `rim_kinds`: outlines that a ghost can have (`rims_of`)
+- `robust`: spread of values with outliers (`MAD_TO_SIGMA`)
 - `sampling`: evenly spaced items of a sequence (`evenly_spaced`)
 - `scratch`: working memory of a thread that is used again (`ScratchBuffer`)
 - `views`: one merged frame with its noise and the position of the light (`View`, `views_of`, `halved_view`,

@@ -179,7 +179,7 @@ def _law(
     if np.count_nonzero(seen) < 2:
         return float(predicted[-1] / max(sigmas[-1], 1e-9)), 0.0
     # centre of the positions whose votes are near the best
-    good = near[seen] > 0.9 * best[seen, None]
+    good = near[seen] > settings.near_best * best[seen, None]
     place = (places[at[seen]] * good).sum(axis=1) / good.sum(axis=1)
     sigma = sigmas[seen]
     basis = np.stack([sigma, sigma**3], axis=1)[:, : 2 if len(sigma) >= settings.cubic_views else 1]

@@ -11,7 +11,7 @@ import numpy as np
 from ...typing import Floats, Pixels
 from ..core.parallel import map_batched
 from ..core.views import View
-from ..fitting.detected_ghost import noise_of
+from ..fitting.detected_ghost import channel_noise
 
 _LEAST_NOISE = 1e-30
 
@@ -22,7 +22,7 @@ def channel_weights(views: Sequence[View]) -> Floats:
     The weights are inverse variances, which maximizes the signal-to-noise ratio of light equal in all colours.
     """
     # noise-free pictures get equal weights
-    counts = np.maximum(noise_of(views).astype(np.float64), _LEAST_NOISE) ** -2.0
+    counts = np.maximum(channel_noise(views).astype(np.float64), _LEAST_NOISE) ** -2.0
     return np.asarray(counts / counts.sum(), dtype=np.float64)
 
 

@@ -145,7 +145,7 @@ def pursue(
             for trial, ghost in zip(queue[:at_once], ghosts, strict=True):
                 queue = queue[1:]
                 if ghost is None:
-                    refused, at_once = _with_refused(refused, trial, len(found)), how.concurrent
+                    refused, at_once = _with_refused(refused, trial, len(found), how), how.concurrent
                     continue
                 found.append(ghost)
                 crescent_trials = [one for one in crescent_trials if one is not trial]
@@ -194,9 +194,11 @@ class _Refused:
     known: int
 
 
-def _with_refused(refused: Sequence[_Refused], trial: RimCandidate, known: int) -> list[_Refused]:
+def _with_refused(
+    refused: Sequence[_Refused], trial: RimCandidate, known: int, settings: PursuitSettings
+) -> list[_Refused]:
     """Return the refused candidates with one refusal added."""
-    before = [one for one in refused if _same(one.candidate, trial)]
+    before = [one for one in refused if _same(one.candidate, trial, settings)]
     others = [one for one in refused if one not in before]
     return [*others, _Refused(trial, 1 + max((one.times for one in before), default=0), known)]
 
@@ -212,7 +214,7 @@ def _open_candidates(
     likely = sorted([each for each in votes if each.score > least], key=lambda each: -each.score)
     for latest in (known // 2 - settings.retry_after, known - 1):
         barred = [one.candidate for one in refused if one.known > latest or one.times >= settings.most_tries]
-        trials = [each for each in likely if not any(_same(each, other) for other in barred)]
+        trials = [each for each in likely if not any(_same(each, other, settings) for other in barred)]
         if trials:
             return trials
     return []
@@ -280,11 +282,13 @@ def _with_subtraction_error(
     return map_batched(one, views, rest, pool=pool)
 
 
-def _same(a: RimCandidate, b: RimCandidate) -> bool:
+def _same(a: RimCandidate, b: RimCandidate, settings: PursuitSettings) -> bool:
     (speed, radius), (other_speed, other_radius) = a.usual, b.usual
-    near = 0.1 * (radius + other_radius) + 4.0
+    near = settings.same_place * (radius + other_radius) + settings.same_place_px
     overlap = min(a.last, b.last) - max(a.first, b.first)
-    return abs(speed - other_speed) < near and abs(radius - other_radius) < 0.6 * near and overlap >= 0
+    if abs(speed - other_speed) >= near or overlap < 0:
+        return False
+    return abs(radius - other_radius) < settings.same_size * near
 
 
 def _stale(trial: RimCandidate, taken: RimCandidate) -> bool:

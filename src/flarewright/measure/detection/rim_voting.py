@@ -148,10 +148,12 @@ def candidates(
     """
     kinds = rims_of(iris)
     rims = np.stack([rim_outline(kind, settings) for kind in kinds])
-    fine = 0.004 * width
-    speeds = np.concatenate([np.arange(-2.6 * width, -1.0 * width, 2.0 * fine), np.arange(-width, width, fine),
-                             np.arange(width, 2.6 * width, 2.0 * fine)])  # fmt: skip
-    sizes = np.concatenate([np.arange(0.006, 0.06, 0.0028), np.geomspace(0.06, 0.45, 40)]) * width
+    fine = settings.step * width
+    usual, most_speed = settings.usual_speed * width, settings.most_speed * width
+    speeds = np.concatenate([np.arange(-most_speed, -usual, 2.0 * fine), np.arange(-usual, usual, fine),
+                             np.arange(usual, most_speed, 2.0 * fine)])  # fmt: skip
+    small = np.arange(settings.least_size, settings.usual_size, settings.size_step)
+    sizes = np.concatenate([small, np.geomspace(settings.usual_size, settings.most_size, settings.sizes)]) * width
     scores, runs = searched(slopes, speeds, sizes, rims, sign=sign, pool=pool, settings=settings)
     # remaining candidates, best first
     places = np.argsort(scores, axis=None)[::-1]
@@ -161,8 +163,9 @@ def candidates(
         found, speed, radius = runs[s[0], r[0]], float(speeds[s[0]]), float(sizes[r[0]])
         first, last, kind = (int(each) for each in found)
         best.append(RimCandidate(speed, radius, first, last, float(scores[s[0], r[0]]), kinds[kind]))
-        reach = 0.3 * sizes[r] + 3.0 * fine
-        near = (np.abs(speeds[s] - speed) < reach + 0.3 * radius) & (np.abs(sizes[r] - radius) < 0.5 * reach + fine)
+        reach = settings.same_place * sizes[r] + settings.same_steps * fine
+        near = np.abs(speeds[s] - speed) < reach + settings.same_place * radius
+        near &= np.abs(sizes[r] - radius) < settings.same_size * reach + fine
         close = near & (runs[s, r, 1] >= first) & (runs[s, r, 0] <= last)
         # the candidate itself must be removed, too
         close[0] = True

@@ -14,6 +14,17 @@ class RimSettings:
     salient: float = 4.0  # gradient, in standard deviations of its noise, that yields half of a full vote
     level: float = 0.16  # subtracted from each view's vote, so that views without a border count against a candidate
     points: int = 40  # number of points of an outline
+    step: float = 0.004  # step of the speeds, over the picture's width; a speed is a position over the field
+    usual_speed: float = 1.0  # maximum speed, over the picture's width, up to which the steps are this fine
+    most_speed: float = 2.6  # maximum speed, over the picture's width; beyond the usual one, steps are twice as long
+    least_size: float = 0.006  # minimum size, over the picture's width
+    usual_size: float = 0.06  # size, over the picture's width, beyond which sizes rise by a factor instead of a step
+    size_step: float = 0.0028  # step of the smaller sizes, over the picture's width
+    most_size: float = 0.45  # maximum size, over the picture's width
+    sizes: int = 40  # number of the larger sizes
+    same_place: float = 0.3  # of two candidates closer than this, over the sum of their sizes, the better one stays
+    same_steps: float = 3.0  # added to that distance, steps of the speeds
+    same_size: float = 0.5  # maximum difference of their sizes, over the part of that distance of the worse one
 
 
 @dataclass(frozen=True)
@@ -30,6 +41,7 @@ class BlobSettings:
     least_sigma: float = 0.03  # least field of a view that votes: nearer to the axis every speed fits
     refits: int = 3  # number of times that the law of motion is refitted around the predicted positions
     trials: int = 80  # number of best speeds that are refined
+    near_best: float = 0.9  # minimum votes, over the best of a view, of the places whose centre is the blob's
     cubic_views: int = 6  # minimum number of views with a blob for a fit of the cubic term
 
 
@@ -62,6 +74,9 @@ class PursuitSettings:
     left_as_blobs: float = 0.2  # expected error of subtracted light for the blob search, as a fraction of it
     blob_reach_px: int = 3  # reach of that error around the light, pixels
     blob_px: float = 3.5  # maximum radius of a blob, pixels
+    same_place: float = 0.1  # maximum distance of two trials of one ghost, over the sum of their sizes
+    same_place_px: float = 4.0  # added to that distance, pixels
+    same_size: float = 0.6  # maximum difference of their sizes, over that distance
     beside_blob_px: float = 3.0  # distance around a blob that its fit uses, pixels
     covers: float = 0.35  # minimum overlap of a fit with its start outline (intersection over union)
     overlap_views: int = 4  # number of views that measure the overlap
@@ -131,6 +146,11 @@ class PictureSettings:
     smoothed_px: float = 7.0  # added half width of that band, pixels
     body: float = 0.5  # minimum mean contrast of a disc to its surroundings, over the noise
     least_noise: float = 1e-4  # minimum noise, over the brightest percentile of the picture
+    finer: tuple[float, ...] = (0.5, 0.125, 0.03)  # steps that refine a found circle, over the step of the search
+    # ring inside a border whose light is the ghost's, and ring outside: bounds over the radius, and added pixels
+    ring_inside: tuple[float, float] = (0.7, 0.93)
+    ring_outside: tuple[float, float] = (1.07, 1.3)
+    ring_outside_px: tuple[float, float] = (2.0, 3.0)
     own_noise: float = 0.04  # minimum noise, over each pixel: slow gradients in bright areas are no borders
 
 

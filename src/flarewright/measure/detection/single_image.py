@@ -20,7 +20,7 @@ from ..core.parameter_vector import bezier_numbers, denominator, field, frame, t
 from ..core.pose_curves import pose_at
 from ..core.views import View, pixel_distances
 from .rim_voting import Slopes, candidates, rim_outline, slopes_of
-from .settings import DetectionSettings, PictureSettings, RimSettings
+from .settings import DetectionSettings, PictureSettings
 
 
 @dataclass(frozen=True)
@@ -96,9 +96,9 @@ def spots_of_picture(
         best = candidates(slopes, width, most=1, settings=settings.rims)
         if not best or best[0].score < enough:
             break
-        place, radius = _refined(steep, best[0].speed, best[0].radius, 0.004 * width, settings.rims)
+        place, radius = _refined(steep, best[0].speed, best[0].radius, width, settings)
         score = min(best[0].score / (1.0 - settings.rims.level), 1.0)
-        found.append(_spot(f"{len(found) + 1}", view, place, radius, score))
+        found.append(_spot(f"{len(found) + 1}", view, place, radius, score, settings.picture))
         slopes = _without(slopes, view, place, radius, settings.picture)
     return tuple(one for one in found if sum(one.rgb) > 3.0 * settings.picture.body * noise)
 
@@ -125,11 +125,13 @@ def _noise(grey: Pixels, settings: PictureSettings) -> float:
     return max(sigma / float(np.sqrt(2.0)), settings.least_noise * float(np.percentile(grey, 99.0)), 1e-20)
 
 
-def _refined(steep: Slopes, place: float, radius: float, step: float, settings: RimSettings) -> tuple[float, float]:
+def _refined(
+    steep: Slopes, place: float, radius: float, width: int, settings: DetectionSettings
+) -> tuple[float, float]:
     """Return the nearby position and radius with the steepest border."""
-    circle = rim_outline(None, settings)[None]
-    for finer in (0.5, 0.125, 0.03):
-        moves = finer * step * np.arange(-4, 5)
+    circle = rim_outline(None, settings.rims)[None]
+    for finer in settings.picture.finer:
+        moves = finer * (settings.rims.step * width) * np.arange(-4, 5)
         speeds, sizes = place + moves, np.maximum(radius + moves, 1.0)
         scores, runs = np.zeros((9, 9)), np.zeros((9, 9, 3), np.int64)
         search(steep.x, steep.y, steep.sigmas, steep.frames, speeds, sizes, circle, False, 0.0, 1.0, scores, runs)
@@ -145,10 +147,11 @@ def _without(slopes: Slopes, view: View, place: float, radius: float, settings: 
     return _cleared(slopes, away < settings.border * radius + settings.smoothed_px)
 
 
-def _spot(name: str, view: View, place: float, radius: float, score: float) -> Spot:
+def _spot(name: str, view: View, place: float, radius: float, score: float, settings: PictureSettings) -> Spot:
     away = pixel_distances(view, place)
-    inside = (away < 0.93 * radius) & (away > 0.7 * radius)
-    outside = (away > 1.07 * radius + 2.0) & (away < 1.3 * radius + 3.0)
+    (low, high), (near, far), (near_px, far_px) = settings.ring_inside, settings.ring_outside, settings.ring_outside_px
+    inside = (away < high * radius) & (away > low * radius)
+    outside = (away > near * radius + near_px) & (away < far * radius + far_px)
     if not (inside.any() and outside.any()):
         return Spot(name, place, radius, (0.0, 0.0, 0.0), score)
     # medians reject other ghosts that cross

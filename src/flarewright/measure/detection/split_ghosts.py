@@ -26,12 +26,12 @@ from ..fitting.detected_ghost import (
     DetectedGhost,
     add_to_residual,
     by_brightness,
+    channel_noise,
     exchange,
     formed,
     isolated_views,
     lay_over,
     leading,
-    noise_of,
     residual_of,
 )
 from ..fitting.footprint import footprint, overlap
@@ -75,7 +75,7 @@ def split_ghosts(
         All ghosts, then the new ones. All colours of a new ghost have the brightness of the leading colour of the
         ghost it was split from; `joint_intensities.lit` corrects that.
     """
-    noise, steps = noise_of(views), journal or Journal()
+    noise, steps = channel_noise(views), journal or Journal()
     rests = [residual_of(ghosts, views, m, pool) for m in range(CHANNELS)]
     out, others = list(ghosts), list[DetectedGhost]()
     for k in by_brightness(ghosts):

@@ -25,11 +25,11 @@ from .detected_ghost import (
     CHANNELS,
     DetectedGhost,
     by_brightness,
+    channel_noise,
     exchange,
     formed,
     isolated_views,
     leading,
-    noise_of,
     residual_of,
 )
 from .ghost_fit import Fit, cost_of, fitted_numbers, improve, refine
@@ -70,7 +70,7 @@ def fit_all(
     list of DetectedGhost
         The needed ghosts, brightest first.
     """
-    ghosts, noise = list(found), noise_of(views)
+    ghosts, noise = list(found), channel_noise(views)
     steps = journal or Journal()
     for turn in range(settings.rounds):
         ghosts = solve_intensities(ghosts, views, pool=pool, settings=settings)

@@ -49,7 +49,7 @@ def by_brightness(ghosts: Sequence[DetectedGhost]) -> list[int]:
     return sorted(range(len(ghosts)), key=lambda k: -float(ghosts[k].shapes[1].numbers[FIRST_I]))
 
 
-def noise_of(views: Sequence[View]) -> Floats:
+def channel_noise(views: Sequence[View]) -> Floats:
     """Return the median noise of red, green and blue over the measured pixels, shape (3,)."""
     known = [view.variance[np.isfinite(view.variance).all(axis=2)] for view in views]
     medians = [np.median(each, axis=0) for each in known if each.size]

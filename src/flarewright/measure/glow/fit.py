@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from ...model.measurement.ghost_model import Blades, Halo, Rgb3, Star
 from ...typing import Floats, Indices, Mask, Pixels
 from ..core.parallel import map_batched
+from ..core.robust import MAD_TO_SIGMA
 from ..core.views import View, all_finite, halved_pixels
 from .laws import halo_radiance, offsets, star_radiance
 from .settings import GlowSettings, HaloSettings, StarSettings, StrengthSettings
 
-_MAD = 1.4826
 # number of rows of the registered picture that are sorted at once
 _BAND = 16
 
@@ -172,7 +172,7 @@ def _error_of_median(values: Floats) -> Floats:
     """Return the standard error of a median along the first axis from the spread of the values."""
     if len(values) < 2:
         return np.asarray(np.abs(values[0]))
-    spread = _MAD * np.nanmedian(np.abs(values - np.nanmedian(values, axis=0)), axis=0)
+    spread = MAD_TO_SIGMA * np.nanmedian(np.abs(values - np.nanmedian(values, axis=0)), axis=0)
     return np.asarray(np.sqrt(0.5 * np.pi / len(values)) * spread)
 
 
@@ -357,7 +357,7 @@ def fit_star(known: Registered, settings: StarSettings = StarSettings()) -> Star
 
 def _fit_star(known: Registered, settings: StarSettings) -> Star | None:
     (x0, y0), width = known.origin, known.picture.shape[1] // 2
-    radii = np.geomspace(0.06 * width, 0.35 * width, 24)
+    radii = np.geomspace(settings.inner * width, settings.outer * width, settings.rings)
     angles = 2.0 * np.pi * np.arange(settings.directions) / settings.directions
     columns = np.clip((x0 + radii[:, None] * np.cos(angles)).astype(int), 0, known.picture.shape[1] - 1)
     rows = np.clip((y0 - radii[:, None] * np.sin(angles)).astype(int), 0, known.picture.shape[0] - 1)
@@ -372,7 +372,7 @@ def _fit_star(known: Registered, settings: StarSettings) -> Star | None:
     harmonics = np.fft.rfft(np.clip(shape - wide, 0.0, 1.0))
     strength = np.abs(harmonics[settings.least_spikes : settings.most_spikes + 1])
     # the number of spikes is the lowest strong harmonic
-    strong = np.flatnonzero(strength > 0.6 * strength.max()) + settings.least_spikes
+    strong = np.flatnonzero(strength > settings.strong * strength.max()) + settings.least_spikes
     spikes = int(strong[0])
     first = -float(np.angle(harmonics[spikes])) / spikes
     ridges = np.round((first + 2.0 * np.pi * np.arange(spikes) / spikes) / (2.0 * np.pi) * settings.directions).astype(
@@ -390,7 +390,7 @@ def _fit_star(known: Registered, settings: StarSettings) -> Star | None:
     filled = low - np.nanquantile(ring, settings.gap_quantile, axis=1)
     error = np.nan_to_num(np.hypot(_error_of_median(tops.swapaxes(0, 1)), filled), nan=np.inf)
     step = 2.0 * np.pi / settings.directions
-    half = max(int(0.4 * settings.directions / spikes), 3)
+    half = max(int(settings.width_part * settings.directions / spikes), 3)
     across = (ridges[:, None] + np.arange(-half, half + 1)) % settings.directions
     light = np.nansum(np.maximum(ring[:, across, 1] - between[:, None, None], 0.0), axis=2)
     widths = np.nanmedian(light, axis=1) * step * radii / np.maximum(height[:, 1], 1e-30) / np.sqrt(2.0 * np.pi)
@@ -406,7 +406,7 @@ def _fit_star(known: Registered, settings: StarSettings) -> Star | None:
     errors = [*errors[::3], errors[-1], _rgb(np.maximum(part, 0.5) * beyond)]
     return Star(
         spikes=spikes, first_deg=float(np.degrees(first)) % (360.0 / spikes),
-        width_px=max(float(np.nanmedian(widths)), 0.4), radius_px=radius, radiance=tuple(levels),
+        width_px=max(float(np.nanmedian(widths)), settings.least_width_px), radius_px=radius, radiance=tuple(levels),
         uncertainty=tuple(errors),
     )  # fmt: skip
 

@@ -16,7 +16,7 @@ from ...typing import Floats, Mask
 from ..core.parameters import Shape
 from ..core.sampling import evenly_spaced
 from ..core.views import View
-from ..fitting.detected_ghost import CHANNELS, DetectedGhost, leading, noise_of
+from ..fitting.detected_ghost import CHANNELS, DetectedGhost, channel_noise, leading
 from ..fitting.ghost_fit import light_of
 from .settings import RejectionSettings
 from .subtraction import AROUND_LIGHT, masks_of
@@ -40,7 +40,7 @@ def is_residual_glow(
         True for ghosts centred on the light in all their views that are faint or hardly larger than the masked disc
         around the light. Also true for ghosts that are a negligible fraction of the light at their position.
     """
-    noise, masks = noise_of(views), masks_of(views)
+    noise, masks = channel_noise(views), masks_of(views)
     return [_is_glow(ghost, leading(ghost, noise), views, masks, settings) for ghost in ghosts]
 
 

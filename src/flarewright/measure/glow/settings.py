@@ -36,6 +36,12 @@ class StarSettings:
     hidden: float = 0.4  # fraction of the spikes that may be hidden
     spike_deg: float = 7.0  # maximum width of a spike, degrees; wider features along a ring are ghosts
     most_blades: int = 20  # an iris with more blades counts as round
+    rings: int = 24  # number of rings around the light that sample the star
+    inner: float = 0.06  # radius of the first ring, over the picture's width
+    outer: float = 0.35  # radius of the last ring, over the picture's width
+    strong: float = 0.6  # minimum of a strong harmonic along the rings, over the strongest
+    width_part: float = 0.4  # half width of the directions that measure a spike's width, over their distance
+    least_width_px: float = 0.4  # minimum width of a spike, pixels
     gap_quantile: float = 0.1  # quantile of the directions that estimates the light between spikes
 
 

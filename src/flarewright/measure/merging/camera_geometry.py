@@ -16,6 +16,7 @@ import numpy as np
 
 from ...errors import FlarewrightError
 from ...typing import Floats
+from ..core.robust import MAD_TO_SIGMA
 from .light_position import LightSighting, two_lights
 from .settings import GeometrySettings
 
@@ -226,7 +227,7 @@ def _fit_path(seen: Sequence[SightingInput], settings: GeometrySettings) -> _Pat
     foot = fit[0] * u + side[0] * np.array([-u[1], u[0]])
     spread = float(np.sqrt(np.mean(np.square([rest, rest_beside]).sum(axis=0))))
     # the median excludes frames where the detection failed, which are no jitter
-    scatter = 1.4826 * float(np.median(np.abs(rest - np.median(rest))))
+    scatter = MAD_TO_SIGMA * float(np.median(np.abs(rest - np.median(rest))))
     jitter = sqrt(max(scatter**2 - float(np.median([one.error_px**2 for one in seen])), 0.0))
     law = (float(slope), *map(float, fit[2:]))
     return _Path(
@@ -273,7 +274,7 @@ def _robust(A: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
     for turn in range(40):
         x = np.linalg.pinv((A.T * weight) @ A) @ (A.T * weight) @ y
         rest = y - A @ x
-        scale = max(1.4826 * float(np.median(np.abs(rest))), 1e-3)
+        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(rest))), 1e-3)
         far = np.abs(rest) / (2.0 * scale)
         weight = 1.0 / (np.maximum(1.0, far) if turn < 20 else 1.0 + far**2)
     rest = y - A @ x

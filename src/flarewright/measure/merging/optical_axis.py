@@ -14,6 +14,7 @@ import numpy as np
 
 from ...typing import Floats, Pixels
 from ..core.binning import binned
+from ..core.robust import MAD_TO_SIGMA
 from .settings import GeometrySettings
 
 Band = Pixels
@@ -62,7 +63,7 @@ def reduced_frame(
     return Reduced(mean(radiance), mean(variance) / (3 * block**2), (light_px[0] / block, light_px[1] / block), block)
 
 
-def star_of(frames: Sequence[Reduced]) -> tuple[Floats, tuple[int, int]]:
+def aligned_star(frames: Sequence[Reduced]) -> tuple[Floats, tuple[int, int]]:
     """Return the light that moves with the light source: a low quantile of the frames aligned at the light.
 
     Parameters
@@ -112,7 +113,7 @@ def axis_beside_path(
     """
     if len(frames) < 3:
         return None
-    star, middle = star_of(frames)
+    star, middle = aligned_star(frames)
     block = frames[0].block
     reach = max(settings.axis_reach * frames[0].light.shape[1], 4.0)
     offsets = np.arange(-reach, reach + 0.5 * settings.axis_step_px, settings.axis_step_px)
@@ -127,7 +128,7 @@ def axis_beside_path(
     values, errors, arms = np.array(found).T
     # limit the influence of a bad frame, such as one with a ghost that the border cuts
     typical = float(np.median(values))
-    scatter = max(1.4826 * float(np.median(np.abs(values - typical))), 0.02)
+    scatter = max(MAD_TO_SIGMA * float(np.median(np.abs(values - typical))), 0.02)
     kept = np.abs(values - typical) < 4.0 * np.maximum(scatter, errors)
     # asymmetry turns the line by some angle, so the weight of a frame grows with the distance of its light
     weight = (arms[kept] / arms[kept].max()) ** 2 / (errors[kept] ** 2 + scatter**2)

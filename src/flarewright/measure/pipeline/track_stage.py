@@ -20,7 +20,7 @@ from ..core.parameters import Shape, rescaled
 from ..core.views import halved_view
 from ..glow.subtraction import subtract_glow
 from ..tracking.follow import follow
-from ..tracking.frame_fit import Shapes, halvings
+from ..tracking.frame_fit import Shapes, frame_halvings
 from .settings import MeasureSettings
 
 
@@ -58,7 +58,7 @@ def track_ghosts(
         When frames cannot be read or are too few, or a ghost is not an `AberrationGhost`.
     """
     check_size(run, model)
-    times = halvings(run.size_px[0], settings.tracking.frame)
+    times = frame_halvings(run.size_px[0], settings.tracking.frame)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         views = subtract_glow(read_views(folder, run, every, pool), model.halo, model.star, pool, settings.glow)
         small = map_batched(partial(halved_view, times=times), views, pool=pool)

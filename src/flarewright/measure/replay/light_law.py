@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...model.measurement.ghost_model import GhostModel
+from ..core.robust import MAD_TO_SIGMA
 from ..core.views import View
 from .model_image import light_px
 
@@ -39,7 +40,7 @@ def light_law(views: Sequence[View], px_per_rad: float) -> tuple[float, float]:
     for _ in range(_LAW_ROUNDS):
         # reduce the weight of positions where another light was detected
         off = np.abs(away - basis @ law)
-        root = 1.0 / np.hypot(1.0, off / (3.0 * max(1.4826 * float(np.median(off)), _LIGHT_PX)))
+        root = 1.0 / np.hypot(1.0, off / (3.0 * max(MAD_TO_SIGMA * float(np.median(off)), _LIGHT_PX)))
         law = np.linalg.lstsq(basis * root[:, None], away * root, rcond=None)[0]
     focal, bent = law
     return float(focal), float(bent / focal)

@@ -18,6 +18,7 @@ from ...model.measurement.sprite import Sprite, encode_pictures
 from ...typing import Floats, Indices, Mask, Pixels
 from ..core.parallel import map_batched
 from ..core.parameter_vector import frame
+from ..core.robust import MAD_TO_SIGMA
 from ..core.views import View
 from ..replay.sprites import draw_sprites, samples, sprite_at, sprite_interval, turned_ways, ways
 
@@ -333,7 +334,7 @@ def over_angles(
                 break
             off = value - basis @ solved.T
             known = np.where(own > 0.0, np.abs(off), np.nan)
-            off = off / (_FAR * 1.4826 * np.maximum(np.nanmedian(known, axis=0), 1e-12))
+            off = off / (_FAR * MAD_TO_SIGMA * np.maximum(np.nanmedian(known, axis=0), 1e-12))
             # positive outliers are unknown ghosts, so they lose more weight
             weight = own / (1.0 + np.where(off > 0.0, off, 0.5 * off) ** 2)
         out[:, part] = solved.T

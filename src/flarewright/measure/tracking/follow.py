@@ -71,7 +71,7 @@ def follow(
     def measure(k: int, past: _History) -> Measured:
         view = views[k]
         return measure_together(
-            ghosts, [_predicted(one, view.constellation_deg) for one in past], view, settings=settings.frame
+            ghosts, [_predicted(one, view.constellation_deg, settings) for one in past], view, settings=settings.frame
         )
 
     with ThreadPoolExecutor(min(threads or 2, 2)) as pool:
@@ -94,11 +94,11 @@ def follow(
     return Tracks(ghosts=tuple(tracks))
 
 
-def _predicted(past: Sequence[tuple[float, Pose]], constellation_deg: float) -> Pose:
+def _predicted(past: Sequence[tuple[float, Pose]], constellation_deg: float, settings: TrackingSettings) -> Pose:
     """Extrapolate a pose by a straight line through the latest ones; without any, return the pose of the model."""
     if not past:
         return Pose()
-    brightness = min(max(past[-1][1].brightness, 0.3), 2.0)
+    brightness = float(np.clip(past[-1][1].brightness, *settings.predicted_brightness))
     if len(past) < 3:
         return Pose(brightness, past[-1][1].along_px, past[-1][1].size)
     at = np.array([angle for angle, _ in past])
@@ -107,7 +107,7 @@ def _predicted(past: Sequence[tuple[float, Pose]], constellation_deg: float) -> 
     # extrapolate no farther than the range of the latest poses
     reach = min(abs(constellation_deg - at[-1]), abs(at[-1] - at[0]))
     along, size = line[0] + line[1] * np.sign(constellation_deg - at[-1]) * reach
-    return Pose(brightness, float(along), float(np.clip(size, 0.5, 1.8)))
+    return Pose(brightness, float(along), float(np.clip(size, *settings.predicted_size)))
 
 
 def _state(measured: Measured, ghost: int, radius: float, settings: TrackingSettings) -> State:

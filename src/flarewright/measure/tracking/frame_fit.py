@@ -25,12 +25,14 @@ Shapes = tuple[Shape, Shape, Shape]
 
 # parameters per ghost: brightness, shift and size; a uniform background of each colour follows
 PER_GHOST = 3
+# derivatives by shift and size scale with the brightness, at least this: an invisible ghost would have none
+_LEAST_LEVEL = 0.1
 # parameters whose derivatives make those of shift and size
 _DERIVED = np.array([0, *range(FIRST_G, FIRST_I)], dtype=np.int64)
 _ROOM = ScratchBuffer()
 
 
-def halvings(width: int, settings: FrameFitSettings = FrameFitSettings()) -> int:
+def frame_halvings(width: int, settings: FrameFitSettings = FrameFitSettings()) -> int:
     """Return the number of halvings of pictures of this width for `measure_together`."""
     times = 0
     while width > settings.width_px * 2**times:
@@ -102,7 +104,8 @@ def measure_together(
     Notes
     -----
     The brightness is linear and can be negative, as noise is. Weak priors about the predicted poses keep an invisible
-    ghost in place. An error above 0.7 of the prior's spread counts as infinite: the prior determines the value then.
+    ghost in place. An error above `settings.known` of the prior's spread counts as infinite: the prior determines the
+    value then.
     """
     poses = list(expected)
     spread = np.array([_spreads(shapes[1], view, settings) for shapes in ghosts]).reshape(-1, PER_GHOST)
@@ -120,7 +123,10 @@ def measure_together(
             pulled = side.copy()
             pulled[:size] += prior[:size] * off.ravel()
             step = solution(matrix + np.diag(prior + 1e-12), pulled)
-            trial = [_stepped(*each) for each in zip(poses, step[:size].reshape(-1, PER_GHOST), spread, strict=True)]
+            trial = [
+                _stepped(*each, settings.sizes)
+                for each in zip(poses, step[:size].reshape(-1, PER_GHOST), spread, strict=True)
+            ]
             if float(step @ pulled) < settings.least_gain * cost:
                 # the predicted gain is too small for another drawing
                 poses = trial
@@ -138,7 +144,7 @@ def measure_together(
     excess = max(1.0, cost / max(count - size, 1))
     error = np.sqrt(np.maximum(np.diag(whole), 0.0) * excess).reshape(-1, PER_GHOST)
     # an error near the prior's spread means that the view does not determine the value
-    error[error > 0.7 * spread] = np.inf
+    error[error > settings.known * spread] = np.inf
     alone = np.array([
         np.linalg.inv(matrix[3 * g : 3 * g + 3, 3 * g : 3 * g + 3] + np.diag(prior[3 * g : 3 * g + 3]))[0, 0]
         for g in range(len(ghosts))
@@ -167,9 +173,9 @@ def _background_spread(view: View, settings: FrameFitSettings) -> Floats:
     return np.asarray(np.maximum(dark, max(least, 1e-12)), dtype=np.float64)
 
 
-def _stepped(pose: Pose, step: Floats, limit: Floats) -> Pose:
+def _stepped(pose: Pose, step: Floats, limit: Floats, sizes: tuple[float, float]) -> Pose:
     cut = np.clip(step[1:], -limit[1:], limit[1:])
-    size = min(max(pose.size + float(cut[1]), 0.4), 2.0)
+    size = min(max(pose.size + float(cut[1]), sizes[0]), sizes[1])
     return Pose(pose.brightness + float(step[0]), pose.along_px + float(cut[0]), size)
 
 
@@ -212,8 +218,7 @@ def _draw_colour(shapes: Sequence[Shape], poses: Sequence[Pose], view: View) -> 
     windows = np.zeros((len(shapes), 6), np.int64)
     seen, count, largest = windows_together(parameters, discs, view.sigma, view.frame, *view.size_px, windows)
     windows, pixels = windows[:seen], np.empty((count, PER_GHOST))
-    # derivatives by shift and size scale with the brightness; limit it to 0.1, or an invisible ghost would have none
-    levels = np.array([max(pose.brightness, 0.1) for pose in poses])
+    levels = np.array([max(pose.brightness, _LEAST_LEVEL) for pose in poses])
     shifts = levels * [by_shift(each, view.sigma) for each in numbers]
     growths = levels[:, None] * np.reshape(
         [shape.numbers[FIRST_G:FIRST_I] for shape in shapes], (-1, _DERIVED.size - 1)

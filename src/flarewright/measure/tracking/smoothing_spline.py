@@ -7,6 +7,7 @@ import numpy as np
 from ...model.measurement.ghost_model import Curve
 from ...typing import Floats
 from ..core.pose_curves import spline_basis
+from ..core.robust import MAD_TO_SIGMA
 from .settings import CurveSettings
 
 
@@ -68,12 +69,12 @@ def within_standard_error(costs: Floats, best: Floats) -> bool:
 
 
 def _weights(constellation_deg: Floats, values: Floats, error: Floats, settings: CurveSettings) -> Floats:
-    """Return inverse variances, at most 25 times their median, with reduced weight for outliers."""
+    """Return inverse variances, at most `settings.most_weight` times their median, with reduced weight for outliers."""
     weight = 1.0 / np.maximum(error, 1e-9) ** 2
-    weight = np.minimum(weight, 25.0 * np.median(weight))
+    weight = np.minimum(weight, settings.most_weight * np.median(weight))
     order = np.argsort(constellation_deg)
     around = np.lib.stride_tricks.sliding_window_view(np.pad(values[order], 2, mode="reflect"), 5)
     off = np.empty(values.size)
     off[order] = np.abs(values[order] - np.median(around, axis=1))
-    scale = np.maximum(1.4826 * float(np.median(off)), error)
+    scale = np.maximum(MAD_TO_SIGMA * float(np.median(off)), error)
     return np.asarray(weight / (1.0 + (off / (settings.outlier * scale)) ** 4))

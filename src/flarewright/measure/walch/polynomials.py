@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...typing import Floats
+from ..core.robust import MAD_TO_SIGMA
 from .settings import WalchSettings
 
 
@@ -61,7 +62,7 @@ def fit_polynomial(
     around = np.lib.stride_tricks.sliding_window_view(np.pad(values[order], 3, mode="reflect"), 7)
     off = np.empty(values.size)
     off[order] = np.abs(values[order] - np.median(around, axis=1))
-    usual = 1.4826 * float(np.median(off[weight > 0.0])) + 1e-12
+    usual = MAD_TO_SIGMA * float(np.median(off[weight > 0.0])) + 1e-12
     trust = 1.0 / (1.0 + (off / (4.0 * usual)) ** 4)
     best, coefficients = _best_order(z, values, weight * trust, settings)
     witnesses = np.count_nonzero((weight > 0.0) & (trust > settings.least_trust))

@@ -16,7 +16,14 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernels.diffraction.fresnel import sharpen, sum_turns, turn_frequencies
+from ...kernels.diffraction.fresnel import (
+    BandAreas,
+    FrequencyLimits,
+    PhaseTables,
+    sharpen,
+    sum_turns,
+    turn_frequencies,
+)
 from ...typing import Floats, Pixels
 from .fft_size import fast_size
 
@@ -332,10 +339,9 @@ def _wave(
     if min(finest_x * area_x, finest_y * area_y) >= _END / FINEST_PART**2:
         ends = (math.inf, math.inf)
     turned = np.empty((2, len(down), count), dtype=np.complex64)
-    light = turn_frequencies(
-        grid.spectrum, across[:count], down, area_x, area_y, math.copysign(1.0, middle[0] * middle[1]),
-        (finest_x, finest_y), ends, table, _fades(), _TO_STEP, turned,
-    )  # fmt: skip
+    own = BandAreas(area_x, area_y, math.copysign(1.0, middle[0] * middle[1]))
+    limits, tables = FrequencyLimits((finest_x, finest_y), ends), PhaseTables(table, _fades(), _TO_STEP)
+    light = turn_frequencies(grid.spectrum, across[:count], down, own, limits, tables, turned)
     return turned[0], turned[1], light / math.prod(grid.shape)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernels.diffraction.fresnel import open_softly
-from ...kernels.diffraction.ringing import draw_ringing
+from ...kernels.diffraction.ringing import StopPatterns, draw_ringing
 from ...kernels.raster.stop_pattern import EDGE, FIRST
 from ...kernels.tracing.iris_edge import reached_edges
 from ...model import Light
@@ -462,7 +462,7 @@ class Textures:
         form = self.rings.ringing.form
         corners = np.empty((0, 2)) if form is None else form.corners
         draw_ringing(
-            data, bundle.pupil, bundle.triangles, densities, len(table), patterns, table, corners, axes, to_pixels,
+            data, bundle.pupil, bundle.triangles, densities, StopPatterns(patterns, table, corners), axes, to_pixels,
             gain * brighter, rgb, plane, bundle.halves,
         )  # fmt: skip
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kernels.paraxial.arguments import EntranceLight, MeridianLens, PathList, SensorFrame, StopOutline
 from ...kernels.paraxial.ghosts import RIM, draw_matrix_ghosts, matrix_squares, measure_matrix_ghosts
 from ...kernels.raster.edge_blur import spread_marks
 from ...kernels.raster.polygons import sum_rows
@@ -70,7 +70,7 @@ def draw_draft(
     if not paths:
         return
     packed, opening = shot.packed, shot.opening
-    steps, view, axes = _steps(shot, paths)
+    bent, light, axes = _arguments(shot)
     colors = draft_colors(shot, paths) if colors is None else colors
     colors, more = colors[:, : len(packed.n_gap)], colors[:, len(packed.n_gap) :]
     hidden = np.flatnonzero(more.any(axis=(1, 2)))
@@ -82,9 +82,10 @@ def draw_draft(
         draw_draft(replace(fine, packed=few), own, differences, more[hidden, waves], first_row)
     # each other memory layout would compile another kernel
     colors = np.ascontiguousarray(colors)
+    frame = SensorFrame(axes, shot.to_pixels - [0.0, first_row, 0.0, 0.0], shot.gain)
     draw_matrix_ghosts(
-        *steps, packed.n_gap, packed.reflectance, packed.sensor_z, *view, opening.edges, opening.radius,
-        opening.levels, axes, shot.to_pixels - [0.0, first_row, 0.0, 0.0], shot.gain, colors, differences,
+        _joined_paths(tuple(paths)), bent, packed.curvature_x, light, _outline(shot), opening.levels, frame, colors,
+        differences,
     )  # fmt: skip
 
 
@@ -263,9 +264,9 @@ def _spectra(shot: Shot, paths: Sequence[LightPath]) -> tuple[PathSpectrum | Non
 
 def _squares(shot: Shot, paths: Sequence[LightPath], w: int) -> Floats:
     """Compute the angles of one ray of each path at a traced wavelength."""
-    steps, view, _ = _steps(shot, paths)
-    squares = np.empty(len(steps[0]))
-    matrix_squares(*steps, shot.packed.n_gap[w], shot.packed.sensor_z, *view, shot.opening.radius, squares)
+    joined, (bent, light, _) = _joined_paths(tuple(paths)), _arguments(shot)
+    squares, radius = np.empty(len(joined.rows)), shot.opening.radius
+    matrix_squares(joined, _at_wavelength(bent, w), shot.packed.curvature_x, light, radius, squares)
     return squares
 
 
@@ -278,24 +279,25 @@ def _fluxes(
     `n_gap` and `reflectance` are as in `PackedLens`, at these wavelengths; `sides` are the edges of the round entrance.
     For an area light the flux counts everywhere, because its spread brings light from beside the picture into it.
     """
-    packed, opening = shot.packed, shot.opening
-    steps, view, axes = _steps(shot, paths)
+    bent, light, axes = _arguments(shot)
+    joined, iris = _joined_paths(tuple(paths)), _outline(shot)
     to_pixels, (width, height) = shot.to_pixels, shot.size_px
     if shot.border is not None:
         to_pixels = to_pixels + np.array([FAR_PX, FAR_PX, 0.0, 0.0])
         width, height = 2 * FAR_PX, 2 * FAR_PX
+    frame = SensorFrame(axes, to_pixels, 1.0)
     found, seen = np.empty((len(paths), len(n_gap))), np.empty((len(paths), 2))
     for m in range(len(n_gap)):
+        own = bent._replace(n_gap=n_gap[m], reflectance=reflectance[m])
         measure_matrix_ghosts(
-            *steps, n_gap[m], reflectance[m], packed.sensor_z, *view, opening.edges, opening.radius, axes,
-            to_pixels, 1.0, float(width), float(height), sides, seen,
-        )  # fmt: skip
+            joined, own, shot.packed.curvature_x, light, iris, frame, float(width), float(height), sides, seen
+        )
         found[:, m] = seen[:, 0]
     return found
 
 
-def _steps(shot: Shot, paths: Sequence[LightPath]) -> tuple[tuple[Any, ...], tuple[float, float, float, float], Floats]:
-    """Return the kernel arguments of paths; of the incoming light (entrance, slopes, nearness); and the axes."""
+def _arguments(shot: Shot) -> tuple[MeridianLens, EntranceLight, Floats]:
+    """Return a shot's lens at all wavelengths and its incoming light as the kernels take them, and the axes."""
     packed = shot.packed
     slope, axes = float(np.tan(shot.incidence.tilt)), shot.incidence.axes
     slope_x, nearness = 0.0, packed.nearness / shot.incidence.tilt_cosine
@@ -303,15 +305,25 @@ def _steps(shot: Shot, paths: Sequence[LightPath]) -> tuple[tuple[Any, ...], tup
         # the two meridians are those of the lens, not of the light
         slope_x, slope = float(axes[1, 0]) * slope, float(axes[1, 1]) * slope
         axes = np.eye(2)
-    steps = (*_joined_paths(tuple(paths)), packed.curvature, packed.curvature_x, packed.z_vertex)
-    return steps, (float(packed.semi[packed.first_surface]), slope, slope_x, nearness), axes
+    lens = MeridianLens(packed.curvature, packed.z_vertex, packed.n_gap, packed.reflectance, packed.sensor_z)
+    return lens, EntranceLight(float(packed.semi[packed.first_surface]), slope, slope_x, nearness), axes
+
+
+def _at_wavelength(lens: MeridianLens, w: int) -> MeridianLens:
+    """Return a lens at one of its wavelengths."""
+    return lens._replace(n_gap=lens.n_gap[w], reflectance=lens.reflectance[w])
+
+
+def _outline(shot: Shot) -> StopOutline:
+    """Return the opening of a shot's iris as the kernels take it."""
+    return StopOutline(shot.opening.edges, shot.opening.radius)
 
 
 # drags repeat the same paths
 @lru_cache(maxsize=64)
-def _joined_paths(paths: tuple[LightPath, ...]) -> tuple[Indices, ...]:
-    """Join rows and actions of paths; return them with the start of each path and its number of stop crossings."""
-    return *joined_steps(paths), np.array([path.stop_crossings for path in paths])
+def _joined_paths(paths: tuple[LightPath, ...]) -> PathList:
+    """Join the steps of paths."""
+    return PathList(*joined_steps(paths), np.array([path.stop_crossings for path in paths]))
 
 
 def downsampled(shot: Shot, times: int) -> Shot:
@@ -335,14 +347,14 @@ def weigh_drafts(shot: Shot, paths: Sequence[LightPath], colors: Floats) -> Floa
     ndarray, shape (len(paths), 2)
         Luminance of the light in the picture, and of one pixel of the ghost; 0 for a ghost that misses the picture.
     """
-    packed, opening = shot.packed, shot.opening
-    steps, view, axes = _steps(shot, paths)
-    middle = len(packed.n_gap) // 2
+    bent, incoming, axes = _arguments(shot)
+    own = _at_wavelength(bent, len(bent.n_gap) // 2)
+    frame = SensorFrame(axes, shot.to_pixels, shot.gain)
     width, height = shot.size_px
     seen = np.empty((len(paths), 2))
     measure_matrix_ghosts(
-        *steps, packed.n_gap[middle], packed.reflectance[middle], packed.sensor_z, *view, opening.edges, opening.radius,
-        axes, shot.to_pixels, shot.gain, float(width), float(height), RIM, seen,
+        _joined_paths(tuple(paths)), own, shot.packed.curvature_x, incoming, _outline(shot), frame,
+        float(width), float(height), RIM, seen,
     )  # fmt: skip
     light: Floats = colors.sum(axis=1) @ luminance_weights(shot.colorspace)
     return seen * light[:, None]

@@ -92,7 +92,7 @@ def draw_stars(
     reach = max(NEAR_PIXELS + 1, math.ceil(painter.outer / min(pixel_mm)) + 1)
     windows = _windows(stars.centres_px, reach)
     if _is_plain(stars.pattern):
-        _add_plain_wings(total, _kernel_arguments(painter, stars, pixel_mm, reach), windows, pixel_mm, threads)
+        _add_plain_wings(total, _star_set(painter, stars, pixel_mm, reach), windows, pixel_mm, threads)
     else:
         add_moved_wings(total, painter, stars.centres_px, stars.gains, windows, pixel_mm, draft=draft, threads=threads)
     _lay_centres(total, painter, stars, pixel_mm, reach, windows, draft)
@@ -100,7 +100,7 @@ def draw_stars(
 
 
 def _add_plain_wings(
-    total: Pixels, shared: tuple[Floats, ...], windows: Indices, pixel_mm: tuple[float, float],
+    total: Pixels, shared: kernel.StarSet, windows: Indices, pixel_mm: tuple[float, float],
     threads: int | None,
 ) -> None:  # fmt: skip
     """Add the wings of a round or straight-bladed iris."""
@@ -111,7 +111,7 @@ def _add_plain_wings(
 
     def band(first: int) -> None:
         rows = slice(first, min(first + BAND, height))
-        kernel.add_sharp_wings(*shared, windows, x, y[rows], first, total[rows])
+        kernel.add_sharp_wings(shared, windows, x, y[rows], first, total[rows])
 
     in_threads(band, range(0, height, BAND), threads)
     total += _upsampled(coarse, (width, height))
@@ -124,8 +124,8 @@ def _windows(centres_px: Floats, reach: int) -> Indices:
     return np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
 
 
-def _kernel_arguments(painter: Painter, stars: Stars, pixel_mm: tuple[float, float], reach: int) -> tuple[Floats, ...]:
-    """Return the leading arguments of both wing kernels."""
+def _star_set(painter: Painter, stars: Stars, pixel_mm: tuple[float, float], reach: int) -> kernel.StarSet:
+    """Return the starbursts as both wing kernels take them."""
     wings, widest = painter.pattern.wings, max(pixel_mm)
     look = np.zeros(kernel.LOOK)
     look[[kernel.PIXEL_X, kernel.PIXEL_Y]] = pixel_mm
@@ -142,7 +142,7 @@ def _kernel_arguments(painter: Painter, stars: Stars, pixel_mm: tuple[float, flo
         spikes, tail = _shortened(profile), profile.tail
         look[kernel.SCALE], look[kernel.STEP] = 0.5 / painter.f_number, profile.step
     centres = stars.centres_px * np.array(pixel_mm) * [1.0, -1.0]
-    return (look, normals, spikes, tail, fan, centres, np.ascontiguousarray(stars.gains))
+    return kernel.StarSet(look, normals, spikes, tail, fan, centres, np.ascontiguousarray(stars.gains))
 
 
 def _shortened(profile: SpikeProfile) -> Floats:
@@ -155,7 +155,7 @@ def _shortened(profile: SpikeProfile) -> Floats:
 
 
 def _coarse(
-    shared: tuple[Floats, ...], pixel_mm: tuple[float, float], size_px: tuple[int, int], threads: int | None
+    shared: kernel.StarSet, pixel_mm: tuple[float, float], size_px: tuple[int, int], threads: int | None
 ) -> Floats:
     """Sample the smooth part of the wings, two samples beyond the picture on every side."""
     columns, rows = (-(-side // COARSE) + 4 for side in size_px)
@@ -165,7 +165,7 @@ def _coarse(
 
     def band(first: int) -> None:
         part = slice(first, min(first + BAND // COARSE, rows))
-        kernel.add_coarse_wings(*shared, x, y[part], found[part])
+        kernel.add_coarse_wings(shared, x, y[part], found[part])
 
     in_threads(band, range(0, rows, BAND // COARSE), threads)
     return found

@@ -16,7 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flarewright.errors import ProjectError
-from flarewright.kernels.diffraction.resample import blend_blade_wings, blend_fan_wings, deposit_core
+from flarewright.kernels.diffraction.resample import (
+    SpikeTables,
+    blend_blade_wings,
+    blend_fan_wings,
+    deposit_core,
+)
 from flarewright.model.lens.iris import Iris
 from flarewright.optics.diffraction.fraunhofer import BladeWings, FanWings, Pattern, pupil_pattern, spike_profile
 from flarewright.optics.pupil.dirt import VeilTerm
@@ -222,12 +227,13 @@ class Painter:
         threads: int | None,
     ) -> None:
         profile = spike_profile(wings, self.wave, self.weights, self.f_number, pixel_mm)
+        spikes = SpikeTables(
+            wings.angle, wings.half_fan, profile.cumulative, profile.density, profile.half_total, profile.tail,
+            profile.step, 0.5 / self.f_number,
+        )  # fmt: skip
 
         def blend(y: Floats, out: Pixels | Floats) -> None:
-            blend_blade_wings(
-                x, y, np.array(pixel_mm), wings.angle, wings.half_fan, profile.cumulative, profile.density,
-                profile.half_total, profile.tail, profile.step, 0.5 / self.f_number, self.inner, self.outer, out,
-            )  # fmt: skip
+            blend_blade_wings(x, y, np.array(pixel_mm), spikes, self.inner, self.outer, out)
 
         _in_bands(blend, y, out, threads)
 
