@@ -4,7 +4,7 @@ from math import sqrt
 
 import numpy as np
 
-from ..jit.decorators import compiled
+from ..jit.decorators import compiled, inner
 from ..tracing.sequential import REFLECT, STOP
 
 
@@ -24,6 +24,11 @@ def path_throughput(reflectance, rows, actions, starts, squares, through):
         Squared sines of incidence of N rays of each path at its steps.
     through : ndarray, shape (P, L)
         Filled with the products, averaged over the rays.
+
+    Notes
+    -----
+    R is interpolated over the cosine cubically at the mirrors and linearly elsewhere: near a film's zero its relative
+    error counts, and a line is up to 10 % off (1e-5 of the light). T errs by 6e-5 at most.
     """
     rays, waves = squares.shape[0], through.shape[1]
     last_place, last_cell = float(reflectance.shape[1] - 1), reflectance.shape[1] - 2
@@ -40,10 +45,30 @@ def path_throughput(reflectance, rows, actions, starts, squares, through):
                 part = place - cell
                 low, high = reflectance[rows[step], cell], reflectance[rows[step], cell + 1]
                 if actions[step] == REFLECT:
+                    first = min(max(cell - 1, 0), last_cell - 2)
+                    a, b, c, d = cubic_weights(place - first)
+                    table = reflectance[rows[step]]
+                    one, two, three, four = table[first], table[first + 1], table[first + 2], table[first + 3]
                     for m in range(waves):
-                        product[m] *= low[m] + part * (high[m] - low[m])
+                        product[m] *= a * one[m] + b * two[m] + c * three[m] + d * four[m]
                 else:
                     for m in range(waves):
                         product[m] *= 1.0 - low[m] - part * (high[m] - low[m])
             for m in range(waves):
                 through[p, m] += product[m]
+
+
+@inner
+def cubic_weights(place):
+    """Return the weights of values at 0, 1, 2 and 3 for the cubic through them (Abramowitz and Stegun 1964, 25.2.13).
+
+    Parameters
+    ----------
+    place : float
+
+    Returns
+    -------
+    a, b, c, d : float
+    """
+    p, q, r = place - 1.0, place - 2.0, place - 3.0
+    return -p * q * r / 6.0, place * q * r / 2.0, -place * p * r / 2.0, place * p * q / 6.0

@@ -51,7 +51,8 @@ def interpolation_error(
     leading term of the error.
     """
     straight, bent = _interpolations(tuple(known_nm), beyond)
-    passed, light = passed[..., ::EVERY], light[::EVERY]
+    # all light, also of a line between two of these wavelengths
+    passed, light = passed[..., ::EVERY], _hats(tuple(CURVE_NM[::EVERY])) @ light
     # not `@`, whose library threads busy-wait next to ours
     line = np.einsum("...w,wl->...l", throughput, straight)
     more = np.maximum(np.einsum("...w,wl->...l", throughput, bent), 0.0) - line
