@@ -12,7 +12,7 @@ from flarewright.model import Camera, Light, Project, Quality
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.optics.rays.bundle import Refinement, trace_bundle, trace_grid
 from flarewright.optics.rays.path_reflectance import CURVE_NM
-from flarewright.render.ghosts.steep_ghosts import _areas_between, abrupt_ends, light_up_to_its_end, near_ends
+from flarewright.render.ghosts.steep_ghosts import ABRUPT_PART, _areas_between, ends, light_up_to_its_end, near_ends
 from flarewright.render.ghosts.traced_ghosts import find_final
 from flarewright.render.scene.between_wavelengths import FINE_NM
 from flarewright.render.scene.opening import make_opening
@@ -53,13 +53,13 @@ def test_wavelengths_are_added_where_light_ends():
         [0.0, 0.0, 0.0, 0.6, 0.8, 1.0],
         [0.3, 0.2, 0.1, 0.02, 0.0, 0.0],
     ])  # fmt: skip
-    rises, falls = abrupt_ends(throughput)
+    rises, falls = ends(throughput, ABRUPT_PART)
     assert np.argwhere(rises).tolist() == [[1, 2]]
     assert not falls.any()
     # the gap that holds the end, and the next on its bright side
     within = np.arange(442.5, 480.0, 2.5)
     assert CURVE_NM[near_ends(nm, rises, falls)].tolist() == within[within != 460.0].tolist()
-    rises, falls = abrupt_ends(throughput[:, ::-1])
+    rises, falls = ends(throughput[:, ::-1], ABRUPT_PART)
     within = np.arange(422.5, 460.0, 2.5)
     assert CURVE_NM[near_ends(nm, rises, falls)].tolist() == within[within != 440.0].tolist()
 

@@ -236,7 +236,7 @@ def draw_matrix_ghosts(
     Notes
     -----
     A ghost is the image of the entrance cut by the iris: a polygon of constant irradiance. Its colour is that of one
-    ray, through the centre of the iris or, where the entrance bounds the ghost, of the entrance.
+    ray, through the middle of the part of the entrance whose light passes the iris.
     """
     height, width = plane.shape[0], plane.shape[1]
     polygon, other = np.zeros((MAX_VERTICES, PSTOP + 6)), np.zeros((MAX_VERTICES, PSTOP + 6))
@@ -373,9 +373,16 @@ def _square(polygon, x, y):
 
 @inner
 def _centre(to_stop, slope, iris_radius, entrance):
-    """Return the height at the entrance of the ray that gives a ghost's colour."""
+    """Return the height at the entrance of the ray that gives a ghost's colour: the middle of what passes both rims.
+
+    A choice between the middles of the iris and of the entrance would jump where both are equally large, and the ray
+    could miss the light.
+    """
     ma, mb = to_stop[0, 0, 0], to_stop[0, 0, 1]
-    return -mb * slope / ma if iris_radius < entrance * abs(ma) else 0.0
+    if abs(ma) * entrance <= 1e-12 * iris_radius:
+        return 0.0
+    middle, reach = -mb * slope / ma, iris_radius / abs(ma)
+    return 0.5 * (max(middle - reach, -entrance) + min(middle + reach, entrance))
 
 
 @inner

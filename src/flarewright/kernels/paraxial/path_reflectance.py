@@ -58,6 +58,62 @@ def path_throughput(reflectance, rows, actions, starts, squares, through):
                 through[p, m] += product[m]
 
 
+@compiled
+def throughput_between(reflectance, rows, actions, starts, squares, nodes, shares, through):
+    """As `path_throughput`, of one ray of each path whose angles at the mirrors change with the wavelength.
+
+    Parameters
+    ----------
+    reflectance, rows, actions, starts, through
+        As in `path_throughput`.
+    squares : ndarray, shape (steps,)
+        Squared sines of incidence, used where light is transmitted.
+    nodes : ndarray, shape (N, steps)
+        Squared sines of incidence at some wavelengths, used at the mirrors.
+    shares : ndarray, shape (N, L)
+        Part that each of them has in each wavelength of `reflectance`: R is linear between them.
+
+    Notes
+    -----
+    What a film reflects at a wavelength changes by several per cent over the angles that rays of other colours have.
+    """
+    waves, count = through.shape[1], nodes.shape[0]
+    last_place, last_cell = float(reflectance.shape[1] - 1), reflectance.shape[1] - 2
+    mirror = np.empty(waves)
+    # most shares are 0
+    places, used = np.empty((count, waves), np.int64), np.zeros(count, np.int64)
+    for n in range(count):
+        for m in range(waves):
+            if shares[n, m] != 0.0:
+                places[n, used[n]] = m
+                used[n] += 1
+    for p in range(through.shape[0]):
+        through[p, :] = 1.0
+        for step in range(starts[p], starts[p + 1]):
+            if actions[step] == STOP:
+                continue
+            table = reflectance[rows[step]]
+            if actions[step] == REFLECT:
+                mirror[:] = 0.0
+                for n in range(count):
+                    place = sqrt(1.0 - nodes[n, step]) * last_place
+                    first = min(max(int(place) - 1, 0), last_cell - 2)
+                    a, b, c, d = cubic_weights(place - first)
+                    one, two, three, four = table[first], table[first + 1], table[first + 2], table[first + 3]
+                    for k in range(used[n]):
+                        m = places[n, k]
+                        mirror[m] += shares[n, m] * (a * one[m] + b * two[m] + c * three[m] + d * four[m])
+                for m in range(waves):
+                    through[p, m] *= mirror[m]
+            else:
+                place = sqrt(1.0 - squares[step]) * last_place
+                cell = min(int(place), last_cell)
+                part = place - cell
+                low, high = table[cell], table[cell + 1]
+                for m in range(waves):
+                    through[p, m] *= 1.0 - low[m] - part * (high[m] - low[m])
+
+
 @inner
 def cubic_weights(place):
     """Return the weights of values at 0, 1, 2 and 3 for the cubic through them (Abramowitz and Stegun 1964, 25.2.13).

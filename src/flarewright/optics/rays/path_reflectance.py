@@ -13,7 +13,7 @@ from functools import cache, cached_property, lru_cache
 
 import numpy as np
 
-from ...kernels.paraxial.path_reflectance import path_throughput
+from ...kernels.paraxial.path_reflectance import path_throughput, throughput_between
 from ...kernels.tracing.representative_rays import traced_squares
 from ...model import Coating, Lens, Medium, Stop
 from ...model.project.light import Spectrum
@@ -46,6 +46,7 @@ __all__ = [
     "joined_steps",
     "path_products",
     "path_spectra",
+    "products_between",
     "step_squares",
 ]
 
@@ -257,6 +258,35 @@ def path_products(reflectance: Floats, paths: Sequence[LightPath], squares: Floa
     path_throughput(
         np.ascontiguousarray(reflectance), *joined_steps(tuple(paths)), np.ascontiguousarray(squares), through
     )
+    return through
+
+
+def products_between(
+    reflectance: Floats, paths: Sequence[LightPath], squares: Floats, nodes: Floats, shares: Floats
+) -> Floats:
+    """Multiply R and T along one ray of each path whose angles at the mirrors change with the wavelength.
+
+    Parameters
+    ----------
+    reflectance : ndarray, shape (K, COSINES, M)
+        Any columns of `BandCurves.reflectance`.
+    paths : sequence of LightPath
+    squares : ndarray, shape (steps,)
+        Squared sines at the steps of all concatenated paths, used where light is transmitted.
+    nodes : ndarray, shape (N, steps)
+        The same at N wavelengths, used at the mirrors.
+    shares : ndarray, shape (N, M)
+        Part that each of them has in each column.
+
+    Returns
+    -------
+    ndarray, shape (P, M)
+    """
+    through = np.empty((len(paths), reflectance.shape[2]))
+    throughput_between(
+        np.ascontiguousarray(reflectance), *joined_steps(tuple(paths)), np.ascontiguousarray(squares),
+        np.ascontiguousarray(nodes), np.ascontiguousarray(shares), through,
+    )  # fmt: skip
     return through
 
 

@@ -23,7 +23,7 @@ __all__ = ["bright_wavelengths", "interpolation_error", "throughput_ratios"]
 
 
 def interpolation_error(
-    passed: Floats, light: Floats, known_nm: Floats, throughput: Floats, beyond: tuple[int, int] = (0, 0)
+    passed: Floats, light: Floats, known_nm: Floats, throughput: Floats, traced: Mask | None = None
 ) -> tuple[Floats, Floats]:
     """Estimate the colour error of a path from linear throughput between the traced wavelengths.
 
@@ -34,11 +34,11 @@ def interpolation_error(
     light : ndarray, shape (L, 3)
         The light in each channel.
     known_nm : ndarray, shape (W,)
-        The traced wavelengths and `beyond` others, ascending.
+        The traced wavelengths and others, ascending.
     throughput : ndarray, shape (..., W)
         At `known_nm`.
-    beyond : tuple of int
-        How many of `known_nm` lie below and above the traced ones.
+    traced : ndarray, shape (W,), bool, optional
+        Which of `known_nm` are traced; None: all.
 
     Returns
     -------
@@ -50,7 +50,8 @@ def interpolation_error(
     The reference is the cubic spline through the same values, with linear ends: its distance from the line is the
     leading term of the error.
     """
-    straight, bent = _interpolations(tuple(known_nm), beyond)
+    drawn = (True,) * len(known_nm) if traced is None else tuple(traced.tolist())
+    straight, bent = _interpolations(tuple(known_nm), drawn)
     # all light, also of a line between two of these wavelengths
     passed, light = passed[..., ::EVERY], _hats(tuple(CURVE_NM[::EVERY])) @ light
     # not `@`, whose library threads busy-wait next to ours
@@ -61,7 +62,7 @@ def interpolation_error(
 
 
 @lru_cache(maxsize=64)
-def _interpolations(known_nm: tuple[float, ...], beyond: tuple[int, int]) -> tuple[Floats, Floats]:
+def _interpolations(known_nm: tuple[float, ...], traced: tuple[bool, ...]) -> tuple[Floats, Floats]:
     """Return the interpolation matrices from wavelengths to the curve, linear between traced ones and cubic, (W, L)."""
     nodes, curve_nm = np.array(known_nm), CURVE_NM[::EVERY]
     straight = hats(curve_nm, nodes)
@@ -84,13 +85,12 @@ def _interpolations(known_nm: tuple[float, ...], beyond: tuple[int, int]) -> tup
     # the ends continue with their slope
     low, high = slope[0] - gap[0] / 6.0 * second[1], slope[-1] + gap[-1] / 6.0 * second[-2]
     bent += np.minimum(curve_nm - nodes[0], 0.0)[:, None] * low + np.maximum(curve_nm - nodes[-1], 0.0)[:, None] * high
-    straight = np.pad(hats(curve_nm, nodes[beyond[0] : len(nodes) - beyond[1]]), (beyond, (0, 0)))
+    straight[:] = 0.0
+    straight[np.array(traced)] = hats(curve_nm, nodes[np.array(traced)])
     return straight, np.ascontiguousarray(bent.T)
 
 
-def throughput_ratios(
-    lit: Mask, traced_nm: Floats, throughput: Floats, fine_nm: Floats, fine: Floats
-) -> tuple[Floats, Floats]:
+def throughput_ratios(lit: Mask, traced_nm: Floats, throughput: Floats, fine: Floats) -> tuple[Floats, Floats]:
     """Split the throughput at all wavelengths over traced ones whose throughput is known only at themselves.
 
     Parameters
@@ -102,10 +102,8 @@ def throughput_ratios(
         Ascending.
     throughput : ndarray, shape (P, W)
         Of paths, at the traced wavelengths.
-    fine_nm : ndarray, shape (M,)
-        Ascending.
-    fine : ndarray, shape (P, M)
-        Throughput at `fine_nm`; linear between, constant beyond.
+    fine : ndarray, shape (P, L)
+        Throughput at `CURVE_NM`.
 
     Returns
     -------
@@ -117,7 +115,7 @@ def throughput_ratios(
     shares = np.zeros((len(traced_nm), len(CURVE_NM)))
     shares[lit] = _hats(tuple(traced_nm[lit]))
     known = np.einsum("pw,wl->pl", throughput, shares)
-    return shares, np.einsum("pm,ml->pl", fine, _hats(tuple(fine_nm))) / known
+    return shares, fine / known
 
 
 @lru_cache(maxsize=64)

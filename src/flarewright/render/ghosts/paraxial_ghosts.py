@@ -18,23 +18,24 @@ from numpy.typing import NDArray
 from ...kernels.paraxial.ghosts import RIM, draw_matrix_ghosts, matrix_squares, measure_matrix_ghosts
 from ...kernels.raster.edge_blur import spread_marks
 from ...kernels.raster.polygons import sum_rows
+from ...kernels.tracing.sequential import REFRACT
 from ...optics.colour.rgb import luminance_weights
 from ...optics.colour.spectrum import hats
 from ...optics.lens.paths import LightPath
-from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum, joined_steps, path_products, path_spectra
+from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum, joined_steps, products_between
 from ...typing import Floats, Indices
 from ..image.canvas import DETAIL_CONTRAST, DETAILS, Plane, merge
 from ..scene.art_rules import PathArt
-from ..scene.between_wavelengths import BEYOND, FINE_NM, NEAREST, STEEP
 from ..scene.paraxial_place import ghost_frame
 from ..scene.shot import Shot, at_fine_wavelengths
 from .art_filters import coarseness, filtered_ghost
 from .extent_blur import shape_kernel, spread_within
 from .steep_ghosts import (
+    ABRUPT_PART,
     DARK_PART,
     FAINT_PART,
-    abrupt_ends,
     bent_weights,
+    ends,
     light_up_to_its_end,
     near_ends,
     over,
@@ -43,8 +44,6 @@ from .steep_ghosts import (
 
 # rounding error of sums of differences, relative to the largest value
 ROUNDING = 1e-12
-# a ray with less than this part of the light is totally reflected somewhere
-LEAST_CARRIED = 1e-13
 # an offset larger than the distance of any ghost from the picture, pixels
 FAR_PX = 10**7
 # straight edges of the round entrance for comparing fluxes
@@ -63,7 +62,7 @@ def draw_draft(
     differences : ndarray, shape (H, W, 3), float64
         Added to; `kernels.raster.polygons.sum_rows` turns it into flux per pixel.
     colors : ndarray, shape (P, W, 3), optional
-        From `draft_colors`, possibly changed by art rules, with or without `FINE_NM`; None: computed.
+        From `draft_colors`, possibly changed by art rules, with or without `Between.fine_nm`; None: computed.
     first_row : int
         First row of the picture that `differences` holds, if it is a band.
     """
@@ -100,60 +99,78 @@ def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
     Returns
     -------
     ndarray, shape (P, W, 3)
-        If a path is dark at all traced wavelengths and not beyond them, the weights at `FINE_NM` follow: (P, W + M, 3).
+        If a path is dark at all traced wavelengths and not beyond them, the weights at `Between.fine_nm` follow:
+        (P, W + M, 3).
     """
     packed = shot.packed
     if not paths:
         return np.zeros((0, len(packed.wavelengths_nm), 3))
-    spectra, squares = _spectra(shot, paths)
-    plain = shot.weights(packed.wavelengths_nm, spectra)
-    colors = np.repeat(plain[None], len(paths), axis=0) if spectra is None else plain
     if shot.between is None:
-        return colors
+        return _plain_weights(shot, paths, _spectra(shot, paths, _angles(shot, paths, packed.n_gap))[0])
+    between = shot.between
+    fine_nm, n_gap, near = between.fine_nm, between.finer[0].n_gap, between.beyond
+    angles = np.concatenate([_angles(shot, paths, one) for one in (packed.n_gap, n_gap[near])])
+    spectra, squares = _spectra(shot, paths, angles, fine_nm[near])
+    colors = _plain_weights(shot, paths, spectra)
     flux = _fluxes(shot, paths, packed.n_gap, packed.reflectance)
     throughput = flux if spectra is None else over(flux, spectra.carried)
-    beyond, carried = _fine_flux(shot, paths, squares, BEYOND)
-    known_nm, known = _merged((packed.wavelengths_nm, throughput), (FINE_NM[BEYOND], over(beyond, carried)))
+    beyond, carried = _fine_flux(shot, paths, squares, n_gap[near], near, angles=angles[len(packed.n_gap) :])
+    known_nm, known = _merged((packed.wavelengths_nm, throughput), (fine_nm[near], over(beyond, carried)))
     starts = joined_steps(tuple(paths))[2]
     for chosen, much in zip(steep_paths(shot, known_nm, known, spectra), (False, True), strict=True):
         if chosen.size == 0:
             continue
         few = [paths[int(k)] for k in chosen]
-        own = None if spectra is None else PathSpectrum(spectra.passed[chosen], spectra.carried[chosen])
-        angles = squares if spectra is None else np.concatenate([squares[starts[k] : starts[k + 1]] for k in chosen])
+        steps = np.concatenate([np.arange(starts[k], starts[k + 1]) for k in chosen])
+        waves = np.arange(len(fine_nm)) if much else between.steep
+        more = np.concatenate([angles[:, steps], _angles(shot, few, n_gap[waves])])
+        own = _spectra(shot, few, more, fine_nm[np.concatenate([near, waves])], squares[steps])[0]
         if much:
             # how much of a sliver lands in the picture depends on the polygon: take the one that is drawn
             drawn = _fluxes(shot, few, packed.n_gap, packed.reflectance, RIM)
-            traced, fine = drawn if own is None else over(drawn, own.carried), _fine_throughput(shot, few, angles)
+            traced = drawn if own is None else over(drawn, own.carried)
+            fine = _fine_throughput(shot, few, squares[steps])
         else:
-            steep = FINE_NM[STEEP], over(*_fine_flux(shot, few, angles, STEEP))
-            traced, fine = throughput[chosen], _merged((known_nm, known[chosen]), steep)
-        colors[chosen] = bent_weights(shot, traced, own, *fine)
+            steep = over(*_fine_flux(shot, few, squares[steps], n_gap[waves], waves, angles=more[-len(waves) :]))
+            traced = throughput[chosen]
+            if between.lines_nm is None:
+                nm, fine = _merged((known_nm, known[chosen]), (fine_nm[waves], steep))
+                fine = fine @ hats(CURVE_NM, nm)
+            else:
+                fine = steep @ between.spread
+        colors[chosen] = bent_weights(shot, traced, own, fine)
     # flux under total reflection is rounding error
     light = beyond.max(axis=1)
     hidden = np.flatnonzero((flux.max(axis=1) < DARK_PART * light) & (light > DARK_PART * FAINT_PART * flux.max()))
     return colors if hidden.size == 0 else _with_hidden(shot, paths, colors, flux, hidden)
 
 
+def _plain_weights(shot: Shot, paths: Sequence[LightPath], spectra: PathSpectrum | None) -> Floats:
+    """Return the weights of `draft_colors` of paths whose throughput is linear between the traced wavelengths."""
+    plain = shot.weights(shot.packed.wavelengths_nm, spectra)
+    return np.repeat(plain[None], len(paths), axis=0) if spectra is None else plain
+
+
 def _with_hidden(
     shot: Shot, paths: Sequence[LightPath], colors: Floats, flux: Floats, hidden: NDArray[np.intp]
 ) -> Floats:
-    """Add weights at `FINE_NM` for paths that are dark at all traced wavelengths, unless they are faint there too."""
+    """Add weights at fine wavelengths for paths that are dark at all traced ones, unless they are faint there too."""
     fine = at_fine_wavelengths(shot)
+    fine_nm = fine.packed.wavelengths_nm
     flux_there = _fluxes(fine, [paths[int(k)] for k in hidden], fine.packed.n_gap, fine.packed.reflectance, RIM)
     light, beyond = (
         np.abs((of[:, :, None] * in_channels).sum(axis=1)).max(axis=1)
-        for of, in_channels in ((flux, colors), (flux_there, fine.weights(FINE_NM)))
+        for of, in_channels in ((flux, colors), (flux_there, fine.weights(fine_nm)))
     )
     seen = beyond > FAINT_PART * light.max()
     if not seen.any():
         return colors
     hidden, flux_there = hidden[seen], flux_there[seen]
     few = [paths[int(k)] for k in hidden]
-    spectra, squares = _spectra(fine, few)
+    spectra, squares = _spectra(fine, few, _angles(fine, few, fine.packed.n_gap))
     throughput = flux_there if spectra is None else over(flux_there, spectra.carried)
-    more, colors = np.zeros((len(paths), len(FINE_NM), 3)), colors.copy()
-    more[hidden] = bent_weights(fine, throughput, spectra, *_fine_throughput(shot, few, squares))
+    more, colors = np.zeros((len(paths), len(fine_nm), 3)), colors.copy()
+    more[hidden] = bent_weights(fine, throughput, spectra, _fine_throughput(shot, few, squares))
     colors[hidden] = 0.0
     return np.concatenate([colors, more], axis=1)
 
@@ -165,19 +182,25 @@ def _merged(one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> tuple[F
 
 
 def _fine_flux(
-    shot: Shot, paths: Sequence[LightPath], squares: Floats, waves: Sequence[int], sides: int = ENTRANCE_SIDES
-) -> tuple[Floats, Floats]:
-    """Compute the flux of paths at some of `FINE_NM`, and what rays carry there.
+    shot: Shot, paths: Sequence[LightPath], squares: Floats, n_gap: Floats, near: NDArray[np.intp],
+    sides: int = ENTRANCE_SIDES, angles: Floats | None = None,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Compute the flux of paths at some wavelengths, and what rays carry there.
 
     Parameters
     ----------
     shot : Shot
     paths : sequence of LightPath
-    squares : ndarray
-        Angles of their rays, as `path_products` takes them.
-    waves : sequence of int
+    squares : ndarray, shape (steps,)
+        From `_spectra`.
+    n_gap : ndarray, shape (M, K + 1)
+        Indices at the wavelengths.
+    near : ndarray of int, shape (M,)
+        The nearest of `Between.fine_nm`, whose mean reflectances the rays carry.
     sides : int
         As in `_fluxes`.
+    angles : ndarray, shape (M, steps), optional
+        From `_angles`; None: computed.
 
     Returns
     -------
@@ -185,12 +208,15 @@ def _fine_flux(
     """
     assert shot.between is not None
     fine, bands = shot.between.finer
-    flux = _fluxes(shot, paths, fine.n_gap[waves], [fine.reflectance[w] for w in waves], sides)
-    return flux, np.ones_like(flux) if bands is None else path_products(bands.means[:, :, waves], paths, squares[None])
+    flux = _fluxes(shot, paths, n_gap, [fine.reflectance[w] for w in near], sides)
+    if bands is None:
+        return flux, np.ones_like(flux)
+    nodes = _angles(shot, paths, n_gap) if angles is None else angles
+    return flux, products_between(bands.means[:, :, near], paths, squares, nodes, np.eye(len(near)))
 
 
-def _fine_throughput(shot: Shot, paths: Sequence[LightPath], squares: Floats) -> tuple[Floats, Floats]:
-    """Compute the throughput of paths at `FINE_NM`, or at `CURVE_NM` where the light of a path ends.
+def _fine_throughput(shot: Shot, paths: Sequence[LightPath], squares: Floats) -> Floats:
+    """Compute the throughput of paths at `CURVE_NM`, from fine wavelengths, and at more where the light of a path ends.
 
     Parameters
     ----------
@@ -201,71 +227,101 @@ def _fine_throughput(shot: Shot, paths: Sequence[LightPath], squares: Floats) ->
 
     Returns
     -------
-    fine_nm : ndarray, shape (M,)
-    throughput : ndarray, shape (P, M)
+    ndarray, shape (P, L)
     """
     assert shot.between is not None
-    fine, n_gap = shot.between.finer[0], shot.between.curve_indices
-    flux, carried = _fine_flux(shot, paths, squares, range(len(FINE_NM)), RIM)
-    throughput = over(flux, carried)
-    rises, falls = abrupt_ends(throughput)
+    between, n_gap, nearest = shot.between, shot.between.curve_indices, shot.between.nearest
+    waves = np.arange(len(between.fine_nm))
+    throughput = over(*_fine_flux(shot, paths, squares, between.finer[0].n_gap, waves, RIM))
+    curve = throughput @ between.spread
+    rises, falls = ends(throughput)
     ended = np.flatnonzero((rises | falls).any(axis=1))
-    if ended.size == 0:
-        return FINE_NM, throughput
+    # between lines is no light
+    if ended.size == 0 or between.lines_nm is not None:
+        return curve
 
-    # rays carry nearly the same as at the nearest fine wavelength
-    more = near_ends(FINE_NM, rises, falls)
-    near = NEAREST[more]
-    found = _fluxes(shot, [paths[int(k)] for k in ended], n_gap[more], [fine.reflectance[w] for w in near], RIM)
-    curve = throughput @ hats(CURVE_NM, FINE_NM)
-    curve[np.ix_(ended, more)] = over(found, carried[np.ix_(ended, near)])
+    starts = joined_steps(tuple(paths))[2]
+    few, steps = [paths[int(k)] for k in ended], np.concatenate([np.arange(starts[k], starts[k + 1]) for k in ended])
+    more = near_ends(between.fine_nm, rises, falls)
+    curve[np.ix_(ended, more)] = over(*_fine_flux(shot, few, squares[steps], n_gap[more], nearest[more], RIM))
     # a curve's wavelengths lie too far apart to resolve an end
     at_curve = curve.copy()
-    for gaps, bright, dark in zip(abrupt_ends(at_curve), (1, 0), (0, 1), strict=True):
+    for gaps, bright, dark in zip(ends(at_curve, ABRUPT_PART), (1, 0), (0, 1), strict=True):
         for k, m in np.argwhere(gaps).tolist():
             low, high = m + bright, m + dark
 
             def at(part: float, path: int = k, low: int = low, high: int = high) -> float:
-                indices, w = n_gap[low] + part * (n_gap[high] - n_gap[low]), int(NEAREST[low])
-                flux = _fluxes(shot, [paths[path]], indices[None], [fine.reflectance[w]], RIM)
-                return float(flux[0, 0] / carried[path, w])
+                indices = (n_gap[low] + part * (n_gap[high] - n_gap[low]))[None]
+                own = squares[starts[path] : starts[path + 1]]
+                return float(over(*_fine_flux(shot, [paths[path]], own, indices, nearest[[low]], RIM))[0, 0])
 
             lit, unlit = light_up_to_its_end(at_curve[k, low], at)
             # by linear interpolation each bound has half of its value
             curve[k, low] += lit - 0.5 * at_curve[k, low]
             curve[k, high] += unlit
-    return CURVE_NM, curve
+    return curve
 
 
-def _spectra(shot: Shot, paths: Sequence[LightPath]) -> tuple[PathSpectrum | None, Floats]:
-    """Compute what coatings pass along paths, and the angles of the rays used for it.
+def _spectra(
+    shot: Shot, paths: Sequence[LightPath], angles: Floats, more_nm: Floats | None = None, squares: Floats | None = None
+) -> tuple[PathSpectrum | None, Floats]:
+    """Compute what coatings pass along one ray of each path.
 
-    The angles are joined as `path_spectra` takes them.
+    Parameters
+    ----------
+    shot : Shot
+    paths : sequence of LightPath
+    angles : ndarray, shape (W + N, steps)
+        From `_angles`, at the traced wavelengths and at others.
+    more_nm : ndarray, shape (N,), optional
+        These other wavelengths.
+    squares : ndarray, shape (steps,), optional
+        Result of an earlier call, for these paths; None: chosen.
+
+    Returns
+    -------
+    spectra : PathSpectrum or None
+        None without films.
+    squares : ndarray, shape (steps,)
+        Angles at which the light is transmitted: those of the middle wavelength, unless its ray is totally reflected.
     """
+    traced_nm = shot.packed.wavelengths_nm
+    if squares is None:
+        squares = _transmitted(paths, angles[: len(traced_nm)])
     if shot.curves is None:
-        return None, np.empty(0)
-    middle = len(shot.packed.n_gap) // 2
-    squares = _squares(shot, paths, middle)
-    spectra = path_spectra(shot.curves, paths, squares[None])
-    # a ray can be totally reflected at one wavelength but not at another
-    starts = joined_steps(tuple(paths))[2]
-    for w in sorted(range(len(shot.packed.n_gap)), key=lambda w: abs(w - middle))[1:]:
-        dark = np.flatnonzero(spectra.carried.max(axis=1) < LEAST_CARRIED)
-        if dark.size == 0:
-            break
-        few = [paths[int(k)] for k in dark]
-        other = _squares(shot, few, w)
-        squares[np.concatenate([np.arange(starts[k], starts[k + 1]) for k in dark])] = other
-        found = path_spectra(shot.curves, few, other[None])
-        spectra.passed[dark], spectra.carried[dark] = found.passed, found.carried
-    return spectra, squares
+        return None, squares
+    nodes_nm, order = np.unique(np.concatenate([traced_nm, [] if more_nm is None else more_nm]), return_index=True)
+    shares = _shares(tuple(nodes_nm), tuple(traced_nm))
+    through = products_between(shot.curves.reflectance, paths, squares, angles[order], shares)
+    return PathSpectrum(through[:, : len(CURVE_NM)], through[:, len(CURVE_NM) :]), squares
 
 
-def _squares(shot: Shot, paths: Sequence[LightPath], w: int) -> Floats:
-    """Compute the angles of one ray of each path at a traced wavelength."""
+@lru_cache(maxsize=64)
+def _shares(nodes_nm: tuple[float, ...], traced_nm: tuple[float, ...]) -> Floats:
+    """Return the part that each node has in the columns of `BandCurves.reflectance`."""
+    return hats(np.concatenate([CURVE_NM, traced_nm]), nodes_nm)
+
+
+def _transmitted(paths: Sequence[LightPath], angles: Floats) -> Floats:
+    """Return the angles, (W, steps), of the middle wavelength, or of the nearest whose ray is not totally reflected."""
+    middle = len(angles) // 2
+    squares: Floats = angles[middle].copy()
+    _, actions, starts = joined_steps(tuple(paths))
+    lost = np.maximum.reduceat(np.where(actions == REFRACT, angles, 0.0), starts[:-1], axis=1) >= 1.0
+    for p in np.flatnonzero(lost[middle]).tolist():
+        for w in sorted(range(len(angles)), key=lambda w: abs(w - middle)):
+            if not lost[w, p]:
+                squares[starts[p] : starts[p + 1]] = angles[w, starts[p] : starts[p + 1]]
+                break
+    return squares
+
+
+def _angles(shot: Shot, paths: Sequence[LightPath], n_gap: Floats) -> Floats:
+    """Compute the angles of one ray of each path at some wavelengths, shape (M, steps): squared sines."""
     steps, view, _ = _steps(shot, paths)
-    squares = np.empty(len(steps[0]))
-    matrix_squares(*steps, shot.packed.n_gap[w], shot.packed.sensor_z, *view, shot.opening.radius, squares)
+    squares = np.empty((len(n_gap), len(steps[0])))
+    for m in range(len(n_gap)):
+        matrix_squares(*steps, n_gap[m], shot.packed.sensor_z, *view, shot.opening.radius, squares[m])
     return squares
 
 

@@ -26,7 +26,6 @@ from ...optics.rays.bundle import Bundle, trace_bundle
 from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum
 from ...optics.rays.steepness import bright_wavelengths, interpolation_error, throughput_ratios
 from ...typing import Floats, Mask
-from ..scene.between_wavelengths import FINE_NM
 from ..scene.path_color import visible_rays
 from ..scene.shot import Shot
 
@@ -50,9 +49,9 @@ BISECTIONS = 5
 ROUNDING = 1e-9
 
 __all__ = [
-    "abrupt_ends",
     "bent_spectrum",
     "bent_weights",
+    "ends",
     "light_up_to_its_end",
     "near_ends",
     "over",
@@ -85,21 +84,22 @@ def steepness(
     if shot.between is None:
         return "not"
     traced_nm = shot.packed.wavelengths_nm
-    known_nm = np.concatenate([FINE_NM[:1], traced_nm, FINE_NM[-1:]])
-    fitted = 1 + np.array(sorted(bundle.traced))
+    known_nm = np.union1d(shot.between.fine_nm[[0, -1]], traced_nm)
+    drawn = np.isin(known_nm, traced_nm)
+    fitted = np.flatnonzero(drawn)[sorted(bundle.traced)]
     few = np.unique([0, *fitted, len(known_nm) - 1])
     throughput = np.empty(len(known_nm))
     throughput[few] = first = _areas_between(shot, bundle, known_nm[few], to_pixels)
     # without a traced wavelength that shows the ghost, extrapolation is too rough to draw it at 21
-    if not first[1:-1].any() or first.max() - first.min() <= LEAST_CHANGE * first.max():
+    if not first[drawn[few]].any() or first.max() - first.min() <= LEAST_CHANGE * first.max():
         return "not"
     others = np.setdiff1d(np.arange(len(known_nm)), few)
     throughput[others] = _areas_between(shot, bundle, known_nm[others], to_pixels)
     passed = np.ones(len(CURVE_NM)) if spectrum is None else spectrum.passed
-    error, total = interpolation_error(passed, seen_light(shot), known_nm, throughput, (1, 1))
+    error, total = interpolation_error(passed, seen_light(shot), known_nm, throughput, drawn)
     if not error > COLOR_ERROR * total:
         return "not"
-    throughput = throughput[1:-1]
+    throughput = throughput[drawn]
     return "much" if throughput.min() < SLIVER_PART * throughput.max() else "little"
 
 
@@ -129,12 +129,15 @@ def bent_spectrum(
         _areas(one, replace(bundle, traced=held), list(range(len(one.packed.wavelengths_nm))), to_pixels)
         for one, held in ((shot, {}), (fine, bundle.traced))
     )
-    traced_nm, fine_nm = shot.packed.wavelengths_nm, fine.packed.wavelengths_nm
+    assert shot.between is not None
+    traced_nm = shot.packed.wavelengths_nm
     if spectrum is None:
         spectrum = PathSpectrum(np.ones(len(CURVE_NM)), np.ones(len(traced_nm)))
     if not known.min() > 0.0:
         return spectrum
-    _, ratios = throughput_ratios(np.ones(len(traced_nm), dtype=np.bool_), traced_nm, known[None], fine_nm, found[None])
+    # not `@`, whose library threads busy-wait next to ours
+    curve = np.einsum("m,ml->l", found, shot.between.spread)[None]
+    _, ratios = throughput_ratios(np.ones(len(traced_nm), dtype=np.bool_), traced_nm, known[None], curve)
     return PathSpectrum(spectrum.passed * ratios[0], spectrum.carried)
 
 
@@ -186,9 +189,9 @@ def steep_paths(
     Parameters
     ----------
     shot : Shot
-    known_nm : ndarray, shape (W + 2,)
-        The traced wavelengths, one below and one above them.
-    throughput : ndarray, shape (P, W + 2)
+    known_nm : ndarray, shape (N,)
+        The traced wavelengths and `Between.beyond`, ascending.
+    throughput : ndarray, shape (P, N)
         Flux there over what rays carry.
     spectra : PathSpectrum or None
         Of all paths.
@@ -199,15 +202,16 @@ def steep_paths(
         Indices by the size of the error; paths much fainter than the brightest are left out.
     """
     passed = np.ones(len(CURVE_NM)) if spectra is None else spectra.passed
-    error, total = interpolation_error(passed, seen_light(shot), known_nm, throughput, (1, 1))
+    drawn = np.isin(known_nm, shot.packed.wavelengths_nm)
+    error, total = interpolation_error(passed, seen_light(shot), known_nm, throughput, drawn)
     seen = total > FAINT_PART * total.max(initial=0.0)
     # a ghost that is dark at one of these wavelengths ends within the spectrum
-    ends = throughput.min(axis=1) < DARK_PART * throughput.max(axis=1)
-    much = seen & (error > np.where(ends, DRAFT_COLOR_ERROR, LARGE_ERROR) * total)
+    ended = throughput.min(axis=1) < DARK_PART * throughput.max(axis=1)
+    much = seen & (error > np.where(ended, DRAFT_COLOR_ERROR, LARGE_ERROR) * total)
     return np.flatnonzero(seen & ~much & (error > DRAFT_COLOR_ERROR * total)), np.flatnonzero(much)
 
 
-def bent_weights(shot: Shot, throughput: Floats, spectra: PathSpectrum | None, fine_nm: Floats, fine: Floats) -> Floats:
+def bent_weights(shot: Shot, throughput: Floats, spectra: PathSpectrum | None, fine: Floats) -> Floats:
     """Return the RGB weights of the traced wavelengths for paths whose throughput is known at many.
 
     Parameters
@@ -217,10 +221,8 @@ def bent_weights(shot: Shot, throughput: Floats, spectra: PathSpectrum | None, f
         Their drawn flux at the traced wavelengths over what rays carry.
     spectra : PathSpectrum or None
         Of these paths.
-    fine_nm : ndarray, shape (M,)
-        Rising wavelengths.
-    fine : ndarray, shape (P, M)
-        Their throughput if these wavelengths were traced.
+    fine : ndarray, shape (P, L)
+        Their throughput if `CURVE_NM` were traced.
 
     Returns
     -------
@@ -232,7 +234,7 @@ def bent_weights(shot: Shot, throughput: Floats, spectra: PathSpectrum | None, f
     weights = np.zeros((*throughput.shape, 3))
     for which in np.unique(lit[lit.any(axis=1)], axis=0):
         alike = np.flatnonzero((lit == which).all(axis=1))
-        shares, passed = throughput_ratios(which, traced_nm, throughput[alike], fine_nm, fine[alike])
+        shares, passed = throughput_ratios(which, traced_nm, throughput[alike], fine[alike])
         if spectra is not None:
             passed = passed * spectra.passed[alike]
         parts = (shares[:, :, None] * light).transpose(1, 0, 2).reshape(len(light), -1)
@@ -240,13 +242,15 @@ def bent_weights(shot: Shot, throughput: Floats, spectra: PathSpectrum | None, f
     return weights if spectra is None else over(weights, spectra.carried[..., None])
 
 
-def abrupt_ends(throughput: Floats) -> tuple[Mask, Mask]:
-    """Find where the light of paths ends abruptly between two wavelengths, as under total reflection.
+def ends(throughput: Floats, least: float = DARK_PART) -> tuple[Mask, Mask]:
+    """Find where the light of paths ends between two wavelengths.
 
     Parameters
     ----------
     throughput : ndarray, shape (P, M)
         At rising wavelengths.
+    least : float
+        Least part of the largest throughput beside the dark; `ABRUPT_PART`: ends as under total reflection.
 
     Returns
     -------
@@ -254,7 +258,7 @@ def abrupt_ends(throughput: Floats) -> tuple[Mask, Mask]:
         The gaps in which light begins and ends.
     """
     most = throughput.max(axis=1, keepdims=True)
-    dark, bright = throughput < DARK_PART * most, throughput > ABRUPT_PART * most
+    dark, bright = throughput < DARK_PART * most, throughput > least * most
     return dark[:, :-1] & bright[:, 1:], bright[:, :-1] & dark[:, 1:]
 
 
@@ -266,7 +270,7 @@ def near_ends(fine_nm: Floats, rises: Mask, falls: Mask) -> NDArray[np.intp]:
     fine_nm : ndarray, shape (M,)
         Rising.
     rises, falls : ndarray, shape (P, M - 1), bool
-        From `abrupt_ends`.
+        From `ends`.
 
     Returns
     -------
