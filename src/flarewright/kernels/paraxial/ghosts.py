@@ -162,39 +162,6 @@ def _meridians(rows, actions, curvature, curvature_x, z_vertex, n_gap, sensor_z,
 
 
 @compiled
-def matrix_squares(
-    rows, actions, starts, crossings, curvature, curvature_x, z_vertex, n_gap, sensor_z,
-    entrance, slope, slope_x, nearness, iris_radius, squares,
-):  # fmt: skip
-    """Compute the angles of incidence of the rays from which `draw_matrix_ghosts` takes the ghosts' colours.
-
-    Parameters
-    ----------
-    rows, actions, starts, crossings, curvature, curvature_x, z_vertex
-        As in `draw_matrix_ghosts`.
-    n_gap : ndarray, shape (K + 1,)
-    sensor_z, entrance, slope, slope_x, nearness, iris_radius : float
-        As in `draw_matrix_ghosts`.
-    squares : ndarray, shape (steps,)
-        Filled with the squared sine on the lower-index side at each step of each path (`paraxial_sines`).
-    """
-    to_stop = np.empty((MOST_CROSSINGS, 2, 2))
-    across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
-    for p in range(starts.size - 1):
-        path_rows, path_actions = rows[starts[p] : starts[p + 1]], actions[starts[p] : starts[p + 1]]
-        _meridians(
-            path_rows, path_actions, curvature, curvature_x, z_vertex, n_gap, sensor_z, nearness, crossings[p],
-            to_stop, across,
-        )  # fmt: skip
-        centre = _centre(to_stop, slope, iris_radius, entrance)
-        beside = 0.0 if curvature_x is None else _centre(across, slope_x, iris_radius, entrance)
-        paraxial_sines(
-            path_rows, path_actions, curvature, curvature_x, z_vertex, n_gap,
-            centre, slope + nearness * centre, beside, slope_x + nearness * beside, squares[starts[p] : starts[p + 1]],
-        )  # fmt: skip
-
-
-@compiled
 def draw_matrix_ghosts(
     rows, actions, starts, crossings, curvature, curvature_x, z_vertex, n_gap, reflectance, sensor_z,
     entrance, slope, slope_x, nearness, edges, iris_radius, mask, axes, to_pixels, gain, rgb, plane,
@@ -274,45 +241,52 @@ def draw_matrix_ghosts(
 
 @compiled
 def measure_matrix_ghosts(
-    rows, actions, starts, crossings, curvature, curvature_x, z_vertex, n_gap, reflectance, sensor_z,
-    entrance, slope, slope_x, nearness, edges, iris_radius, axes, to_pixels, gain, width, height, sides, found,
+    rows, actions, starts, crossings, curvature, curvature_x, z_vertex, n_gap, reflectance, near, sensor_z,
+    entrance, slope, slope_x, nearness, edges, iris_radius, axes, to_pixels, gain, width, height, sides, found, squares,
 ):  # fmt: skip
-    """Compute the irradiance of the ghosts of `draw_matrix_ghosts` and their flux in the picture.
+    """Compute the irradiance of the ghosts of `draw_matrix_ghosts`, their flux in the picture and their rays' angles.
 
     Parameters
     ----------
     rows ... z_vertex
         As in `draw_matrix_ghosts`.
-    n_gap : ndarray, shape (K + 1,)
-    reflectance : ndarray, shape (K, M)
+    n_gap : ndarray, shape (M, K + 1)
+        At M wavelengths, which need not be those of `reflectance`.
+    reflectance : ndarray, shape (W, K, S)
+    near : ndarray, shape (M,), int64
+        Which of the W reflectances the rays of each wavelength have.
     sensor_z ... gain
         As in `draw_matrix_ghosts`.
     width, height : float
         Pixels.
     sides : int
         Edges of the polygon for the round rim of the entrance; `draw_matrix_ghosts` uses `RIM`.
-    found : ndarray, shape (P, 2)
+    found : ndarray, shape (P, M, 2)
         Filled with the flux inside the picture and the flux per pixel inside the ghost.
+    squares : ndarray, shape (M, steps)
+        Filled with the squared sine on the lower-index side at each step of each path (`paraxial_sines`), of the rays
+        from which the colours are taken.
     """
     polygon, other = np.zeros((MAX_VERTICES, PSTOP + 6)), np.zeros((MAX_VERTICES, PSTOP + 6))
     values = np.empty(MAX_VERTICES)
-    squares = np.empty(rows.size)
     to_stop = np.empty((MOST_CROSSINGS, 2, 2))
     across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
     rim = _rim(entrance, sides)
     spots, ring = _outline(sides, edges)
-    for p in range(starts.size - 1):
-        found[p, 0] = found[p, 1] = 0.0
-        count, even = _place_ghost(
-            rows[starts[p] : starts[p + 1]], actions[starts[p] : starts[p + 1]], crossings[p], curvature, curvature_x,
-            z_vertex, n_gap, reflectance, sensor_z, entrance, slope, slope_x, nearness, edges, iris_radius, axes,
-            to_pixels, rim, spots, ring, polygon, squares, to_stop, across,
-        )  # fmt: skip
-        if count > 0:
-            count = cut_to_rectangle(polygon, count, other, values, width, height)
-        if count >= 3:
-            found[p, 0] = gain * even * abs(polygon_area(polygon, count, PX, PY))
-            found[p, 1] = gain * even
+    for m in range(n_gap.shape[0]):
+        for p in range(starts.size - 1):
+            found[p, m, 0] = found[p, m, 1] = 0.0
+            count, even = _place_ghost(
+                rows[starts[p] : starts[p + 1]], actions[starts[p] : starts[p + 1]], crossings[p], curvature,
+                curvature_x, z_vertex, n_gap[m], reflectance[near[m]], sensor_z, entrance, slope, slope_x, nearness,
+                edges, iris_radius, axes, to_pixels, rim, spots, ring, polygon, squares[m, starts[p] : starts[p + 1]],
+                to_stop, across,
+            )  # fmt: skip
+            if count > 0:
+                count = cut_to_rectangle(polygon, count, other, values, width, height)
+            if count >= 3:
+                found[p, m, 0] = gain * even * abs(polygon_area(polygon, count, PX, PY))
+                found[p, m, 1] = gain * even
 
 
 @inner
@@ -320,16 +294,12 @@ def _place_ghost(
     rows, actions, crossings, curvature, curvature_x, z_vertex, n_gap, reflectance, sensor_z, entrance, slope, slope_x,
     nearness, edges, iris_radius, axes, to_pixels, rim, spots, ring, polygon, squares, to_stop, across,
 ):  # fmt: skip
-    """Fill a polygon with a ghost's outline in pixels; return its number of vertices and its flux per pixel."""
+    """Fill a polygon with a ghost's outline in pixels; return its number of vertices and its flux per pixel.
+
+    `squares` is filled with the angles of its ray, also of a ghost that is dark.
+    """
     a, b, ax, bx = _meridians(
         rows, actions, curvature, curvature_x, z_vertex, n_gap, sensor_z, nearness, crossings, to_stop, across
-    )
-    close_ring(rim, spots, ring)
-    head = _cut_by_iris(spots, ring, rim.shape[0], crossings, to_stop, across, slope, slope_x, axes, edges, entrance)
-    if head < 0:
-        return np.int64(0), 0.0
-    count = _project_entrance(
-        polygon, spots, ring, head, slope, slope_x, a, b, ax, bx, to_stop, across, crossings, axes
     )
     centre = _centre(to_stop, slope, iris_radius, entrance)
     beside = 0.0 if curvature_x is None else _centre(across, slope_x, iris_radius, entrance)
@@ -337,6 +307,13 @@ def _place_ghost(
         rows, actions, curvature, curvature_x, z_vertex, n_gap,
         centre, slope + nearness * centre, beside, slope_x + nearness * beside, squares,
     )  # fmt: skip
+    close_ring(rim, spots, ring)
+    head = _cut_by_iris(spots, ring, rim.shape[0], crossings, to_stop, across, slope, slope_x, axes, edges, entrance)
+    if head < 0:
+        return np.int64(0), 0.0
+    count = _project_entrance(
+        polygon, spots, ring, head, slope, slope_x, a, b, ax, bx, to_stop, across, crossings, axes
+    )
     flux = paraxial_weight(rows, actions, reflectance, squares) * abs(polygon_area(polygon, count, PP, PQ))
     for k in range(count):
         x, y = polygon[k, PX], polygon[k, PY]

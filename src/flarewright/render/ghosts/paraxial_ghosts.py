@@ -9,20 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernels.paraxial.ghosts import RIM, draw_matrix_ghosts, matrix_squares, measure_matrix_ghosts
+from ...kernels.paraxial.ghosts import RIM, draw_matrix_ghosts, measure_matrix_ghosts
 from ...kernels.raster.edge_blur import spread_marks
 from ...kernels.raster.polygons import sum_rows
 from ...kernels.tracing.sequential import REFRACT
 from ...optics.colour.rgb import luminance_weights
 from ...optics.colour.spectrum import hats
 from ...optics.lens.paths import LightPath
-from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum, joined_steps, products_between
+from ...optics.rays.path_reflectance import CURVE_NM, BandCurves, PathSpectrum, joined_steps, products_between
 from ...typing import Floats, Indices
 from ..image.canvas import DETAIL_CONTRAST, DETAILS, Plane, merge
 from ..scene.art_rules import PathArt
@@ -105,40 +105,41 @@ def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
     packed = shot.packed
     if not paths:
         return np.zeros((0, len(packed.wavelengths_nm), 3))
+    flux, angles = _fluxes(shot, paths, packed.n_gap, packed.reflectance)
     if shot.between is None:
-        return _plain_weights(shot, paths, _spectra(shot, paths, _angles(shot, paths, packed.n_gap))[0])
+        return _plain_weights(shot, paths, _spectra(shot, paths, angles)[0])
     between = shot.between
-    fine_nm, n_gap, near = between.fine_nm, between.finer[0].n_gap, between.beyond
-    angles = np.concatenate([_angles(shot, paths, one) for one in (packed.n_gap, n_gap[near])])
+    fine_nm, (fine, bands), near = between.fine_nm, between.finer, between.beyond
+    beyond, more = _fluxes(shot, paths, fine.n_gap[near], fine.reflectance, near)
+    angles = np.concatenate([angles, more])
     spectra, squares = _spectra(shot, paths, angles, fine_nm[near])
     colors = _plain_weights(shot, paths, spectra)
-    flux = _fluxes(shot, paths, packed.n_gap, packed.reflectance)
     throughput = flux if spectra is None else over(flux, spectra.carried)
-    beyond, carried = _fine_flux(shot, paths, squares, n_gap[near], near, angles=angles[len(packed.n_gap) :])
+    carried = _carried(bands, paths, squares, more, near)
     known_nm, known = _merged((packed.wavelengths_nm, throughput), (fine_nm[near], over(beyond, carried)))
-    starts = joined_steps(tuple(paths))[2]
     for chosen, much in zip(steep_paths(shot, known_nm, known, spectra), (False, True), strict=True):
         if chosen.size == 0:
             continue
         few = [paths[int(k)] for k in chosen]
-        steps = np.concatenate([np.arange(starts[k], starts[k + 1]) for k in chosen])
+        steps = _steps_of(paths, chosen)
         waves = np.arange(len(fine_nm)) if much else between.steep
-        more = np.concatenate([angles[:, steps], _angles(shot, few, n_gap[waves])])
-        own = _spectra(shot, few, more, fine_nm[np.concatenate([near, waves])], squares[steps])[0]
+        # how much of a sliver lands in the picture depends on the polygon: take the one that is drawn
+        sides = RIM if much else ENTRANCE_SIDES
+        steep, more = _fluxes(shot, few, fine.n_gap[waves], fine.reflectance, waves, sides)
+        known_angles = np.concatenate([angles[:, steps], more])
+        own = _spectra(shot, few, known_angles, fine_nm[np.concatenate([near, waves])], squares[steps])[0]
+        steep = over(steep, _carried(bands, few, squares[steps], more, waves))
         if much:
-            # how much of a sliver lands in the picture depends on the polygon: take the one that is drawn
-            drawn = _fluxes(shot, few, packed.n_gap, packed.reflectance, RIM)
-            traced = drawn if own is None else over(drawn, own.carried)
-            fine = _fine_throughput(shot, few, squares[steps])
+            drawn = _fluxes(shot, few, packed.n_gap, packed.reflectance, sides=RIM)[0]
+            traced, curve = drawn if own is None else over(drawn, own.carried), _curve(shot, few, squares[steps], steep)
         else:
-            steep = over(*_fine_flux(shot, few, squares[steps], n_gap[waves], waves, angles=more[-len(waves) :]))
             traced = throughput[chosen]
             if between.lines_nm is None:
-                nm, fine = _merged((known_nm, known[chosen]), (fine_nm[waves], steep))
-                fine = fine @ hats(CURVE_NM, nm)
+                nm, steep = _merged((known_nm, known[chosen]), (fine_nm[waves], steep))
+                curve = steep @ hats(CURVE_NM, nm)
             else:
-                fine = steep @ between.spread
-        colors[chosen] = bent_weights(shot, traced, own, fine)
+                curve = steep @ between.spread
+        colors[chosen] = bent_weights(shot, traced, own, curve)
     # flux under total reflection is rounding error
     light = beyond.max(axis=1)
     hidden = np.flatnonzero((flux.max(axis=1) < DARK_PART * light) & (light > DARK_PART * FAINT_PART * flux.max()))
@@ -157,22 +158,29 @@ def _with_hidden(
     """Add weights at fine wavelengths for paths that are dark at all traced ones, unless they are faint there too."""
     fine = at_fine_wavelengths(shot)
     fine_nm = fine.packed.wavelengths_nm
-    flux_there = _fluxes(fine, [paths[int(k)] for k in hidden], fine.packed.n_gap, fine.packed.reflectance, RIM)
+    waves = np.arange(len(fine_nm))
+    own = [paths[int(k)] for k in hidden]
+    flux_there, angles = _fluxes(fine, own, fine.packed.n_gap, fine.packed.reflectance, sides=RIM)
     light, beyond = (
         np.abs((of[:, :, None] * in_channels).sum(axis=1)).max(axis=1)
         for of, in_channels in ((flux, colors), (flux_there, fine.weights(fine_nm)))
     )
-    seen = beyond > FAINT_PART * light.max()
-    if not seen.any():
+    seen = np.flatnonzero(beyond > FAINT_PART * light.max())
+    if seen.size == 0:
         return colors
-    hidden, flux_there = hidden[seen], flux_there[seen]
-    few = [paths[int(k)] for k in hidden]
-    spectra, squares = _spectra(fine, few, _angles(fine, few, fine.packed.n_gap))
-    throughput = flux_there if spectra is None else over(flux_there, spectra.carried)
+    few, angles = [own[int(k)] for k in seen], angles[:, _steps_of(own, seen)]
+    spectra, squares = _spectra(fine, few, angles)
+    throughput = over(flux_there[seen], _carried(fine.curves, few, squares, angles, waves))
     more, colors = np.zeros((len(paths), len(fine_nm), 3)), colors.copy()
-    more[hidden] = bent_weights(fine, throughput, spectra, _fine_throughput(shot, few, squares))
-    colors[hidden] = 0.0
+    more[hidden[seen]] = bent_weights(fine, throughput, spectra, _curve(shot, few, squares, throughput))
+    colors[hidden[seen]] = 0.0
     return np.concatenate([colors, more], axis=1)
+
+
+def _steps_of(paths: Sequence[LightPath], chosen: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the steps of some paths among those of all concatenated ones."""
+    starts = joined_steps(tuple(paths))[2]
+    return np.concatenate([np.arange(starts[k], starts[k + 1]) for k in chosen])
 
 
 def _merged(one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
@@ -181,11 +189,30 @@ def _merged(one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> tuple[F
     return nm, np.concatenate([one[1], other[1]], axis=1)[:, order]
 
 
-def _fine_flux(
-    shot: Shot, paths: Sequence[LightPath], squares: Floats, n_gap: Floats, near: NDArray[np.intp],
-    sides: int = ENTRANCE_SIDES, angles: Floats | None = None,
-) -> tuple[Floats, Floats]:  # fmt: skip
-    """Compute the flux of paths at some wavelengths, and what rays carry there.
+def _carried(
+    bands: BandCurves | None, paths: Sequence[LightPath], squares: Floats, angles: Floats, near: Indices
+) -> Floats:
+    """Return what rays carry that have the mean reflectances of some wavelengths, shape (P, M).
+
+    Parameters
+    ----------
+    bands : BandCurves or None
+        None: without films.
+    paths : sequence of LightPath
+    squares : ndarray, shape (steps,)
+        From `_spectra`.
+    angles : ndarray, shape (M, steps)
+        From `_fluxes`.
+    near : ndarray of int, shape (M,)
+        Wavelengths of `bands`.
+    """
+    if bands is None:
+        return np.ones((len(paths), len(near)))
+    return products_between(bands.means[:, :, near], paths, squares, angles, np.eye(len(near)))
+
+
+def _curve(shot: Shot, paths: Sequence[LightPath], squares: Floats, throughput: Floats) -> Floats:
+    """Return the throughput of paths at `CURVE_NM`; where the light of a path ends, it is computed there.
 
     Parameters
     ----------
@@ -193,73 +220,49 @@ def _fine_flux(
     paths : sequence of LightPath
     squares : ndarray, shape (steps,)
         From `_spectra`.
-    n_gap : ndarray, shape (M, K + 1)
-        Indices at the wavelengths.
-    near : ndarray of int, shape (M,)
-        The nearest of `Between.fine_nm`, whose mean reflectances the rays carry.
-    sides : int
-        As in `_fluxes`.
-    angles : ndarray, shape (M, steps), optional
-        From `_angles`; None: computed.
-
-    Returns
-    -------
-    flux, carried : ndarray, shape (P, M)
-    """
-    assert shot.between is not None
-    fine, bands = shot.between.finer
-    flux = _fluxes(shot, paths, n_gap, [fine.reflectance[w] for w in near], sides)
-    if bands is None:
-        return flux, np.ones_like(flux)
-    nodes = _angles(shot, paths, n_gap) if angles is None else angles
-    return flux, products_between(bands.means[:, :, near], paths, squares, nodes, np.eye(len(near)))
-
-
-def _fine_throughput(shot: Shot, paths: Sequence[LightPath], squares: Floats) -> Floats:
-    """Compute the throughput of paths at `CURVE_NM`, from fine wavelengths, and at more where the light of a path ends.
-
-    Parameters
-    ----------
-    shot : Shot
-    paths : sequence of LightPath
-    squares : ndarray
-        As in `_fine_flux`.
+    throughput : ndarray, shape (P, M)
+        At `Between.fine_nm`.
 
     Returns
     -------
     ndarray, shape (P, L)
     """
     assert shot.between is not None
-    between, n_gap, nearest = shot.between, shot.between.curve_indices, shot.between.nearest
-    waves = np.arange(len(between.fine_nm))
-    throughput = over(*_fine_flux(shot, paths, squares, between.finer[0].n_gap, waves, RIM))
-    curve = throughput @ between.spread
-    rises, falls = ends(throughput)
-    ended = np.flatnonzero((rises | falls).any(axis=1))
+    between, (fine, bands) = shot.between, shot.between.finer
+    n_gap, nearest, curve = between.curve_indices, between.nearest, throughput @ between.spread
     # between lines is no light
-    if ended.size == 0 or between.lines_nm is not None:
+    if between.lines_nm is not None:
         return curve
 
-    starts = joined_steps(tuple(paths))[2]
-    few, steps = [paths[int(k)] for k in ended], np.concatenate([np.arange(starts[k], starts[k + 1]) for k in ended])
-    more = near_ends(between.fine_nm, rises, falls)
-    curve[np.ix_(ended, more)] = over(*_fine_flux(shot, few, squares[steps], n_gap[more], nearest[more], RIM))
-    # a curve's wavelengths lie too far apart to resolve an end
-    at_curve = curve.copy()
-    for gaps, bright, dark in zip(ends(at_curve, ABRUPT_PART), (1, 0), (0, 1), strict=True):
-        for k, m in np.argwhere(gaps).tolist():
-            low, high = m + bright, m + dark
+    rises, falls = ends(throughput)
+    for k in np.flatnonzero((rises | falls).any(axis=1)):
+        own, steps = [paths[k]], squares[_steps_of(paths, k[None])]
 
-            def at(part: float, path: int = k, low: int = low, high: int = high) -> float:
-                indices = (n_gap[low] + part * (n_gap[high] - n_gap[low]))[None]
-                own = squares[starts[path] : starts[path + 1]]
-                return float(over(*_fine_flux(shot, [paths[path]], own, indices, nearest[[low]], RIM))[0, 0])
+        more = near_ends(between.fine_nm, rises[[k]], falls[[k]])
+        flux, angles = _fluxes(shot, own, n_gap[more], fine.reflectance, nearest[more], RIM)
+        curve[k, more] = over(flux, _carried(bands, own, steps, angles, nearest[more]))[0]
+        # a curve's wavelengths lie too far apart to resolve an end
+        at_curve = curve[[k]]
+        for gaps, bright, dark in zip(ends(at_curve, ABRUPT_PART), (1, 0), (0, 1), strict=True):
+            for m in np.flatnonzero(gaps[0]).tolist():
+                low, high = m + bright, m + dark
 
-            lit, unlit = light_up_to_its_end(at_curve[k, low], at)
-            # by linear interpolation each bound has half of its value
-            curve[k, low] += lit - 0.5 * at_curve[k, low]
-            curve[k, high] += unlit
+                at = partial(_flux_between, shot, own, n_gap[low], n_gap[high], nearest[[low]])
+                # relative to the bright bound, because rays carry nearly the same within a gap
+                bright_flux = at(0.0)
+                scale = at_curve[0, low] / bright_flux
+                lit, unlit = (scale * part for part in light_up_to_its_end(bright_flux, at))
+                # by linear interpolation each bound has half of its value
+                curve[k, low] += lit - 0.5 * at_curve[0, low]
+                curve[k, high] += unlit
     return curve
+
+
+def _flux_between(shot: Shot, path: list[LightPath], low: Floats, high: Floats, near: Indices, part: float) -> float:
+    """Compute the flux of one path where indices lie between two sets, with the mean reflectances of one wavelength."""
+    assert shot.between is not None
+    reflectance = shot.between.finer[0].reflectance
+    return float(_fluxes(shot, path, (low + part * (high - low))[None], reflectance, near, RIM)[0][0, 0])
 
 
 def _spectra(
@@ -272,7 +275,7 @@ def _spectra(
     shot : Shot
     paths : sequence of LightPath
     angles : ndarray, shape (W + N, steps)
-        From `_angles`, at the traced wavelengths and at others.
+        From `_fluxes`, at the traced wavelengths and at others.
     more_nm : ndarray, shape (N,), optional
         These other wavelengths.
     squares : ndarray, shape (steps,), optional
@@ -316,23 +319,30 @@ def _transmitted(paths: Sequence[LightPath], angles: Floats) -> Floats:
     return squares
 
 
-def _angles(shot: Shot, paths: Sequence[LightPath], n_gap: Floats) -> Floats:
-    """Compute the angles of one ray of each path at some wavelengths, shape (M, steps): squared sines."""
-    steps, view, _ = _steps(shot, paths)
-    squares = np.empty((len(n_gap), len(steps[0])))
-    for m in range(len(n_gap)):
-        matrix_squares(*steps, n_gap[m], shot.packed.sensor_z, *view, shot.opening.radius, squares[m])
-    return squares
-
-
 def _fluxes(
-    shot: Shot, paths: Sequence[LightPath], n_gap: Floats, reflectance: Floats | list[Floats],
+    shot: Shot, paths: Sequence[LightPath], n_gap: Floats, reflectance: Floats, near: Indices | None = None,
     sides: int = ENTRANCE_SIDES,
-) -> Floats:  # fmt: skip
-    """Compute the flux of each ghost in the picture at some wavelengths, per unit irradiance, shape (P, M).
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Compute the flux of each ghost in the picture at some wavelengths, and the angles of one ray.
 
-    `n_gap` and `reflectance` are as in `PackedLens`, at these wavelengths; `sides` are the edges of the round entrance.
-    For an area light the flux counts everywhere, because its spread brings light from beside the picture into it.
+    Parameters
+    ----------
+    shot : Shot
+    paths : sequence of LightPath
+    n_gap : ndarray, shape (M, K + 1)
+    reflectance : ndarray, shape (W, K, S)
+    near : ndarray of int, shape (M,), optional
+        Which of the W belong to each of the M; None: they are the same.
+    sides : int
+        Edges of the round entrance.
+
+    Returns
+    -------
+    flux : ndarray, shape (P, M)
+        Per unit irradiance. For an area light it counts everywhere, because its spread brings light from beside the
+        picture into it.
+    angles : ndarray, shape (M, steps)
+        Squared sines on the side of the lower index.
     """
     packed, opening = shot.packed, shot.opening
     steps, view, axes = _steps(shot, paths)
@@ -340,14 +350,12 @@ def _fluxes(
     if shot.border is not None:
         to_pixels = to_pixels + np.array([FAR_PX, FAR_PX, 0.0, 0.0])
         width, height = 2 * FAR_PX, 2 * FAR_PX
-    found, seen = np.empty((len(paths), len(n_gap))), np.empty((len(paths), 2))
-    for m in range(len(n_gap)):
-        measure_matrix_ghosts(
-            *steps, n_gap[m], reflectance[m], packed.sensor_z, *view, opening.edges, opening.radius, axes,
-            to_pixels, 1.0, float(width), float(height), sides, seen,
-        )  # fmt: skip
-        found[:, m] = seen[:, 0]
-    return found
+    found, angles = np.empty((len(paths), len(n_gap), 2)), np.empty((len(n_gap), len(steps[0])))
+    measure_matrix_ghosts(
+        *steps, n_gap, reflectance, np.arange(len(n_gap)) if near is None else near, packed.sensor_z, *view,
+        opening.edges, opening.radius, axes, to_pixels, 1.0, float(width), float(height), sides, found, angles,
+    )  # fmt: skip
+    return found[:, :, 0], angles
 
 
 def _steps(shot: Shot, paths: Sequence[LightPath]) -> tuple[tuple[Any, ...], tuple[float, float, float, float], Floats]:
@@ -393,15 +401,15 @@ def weigh_drafts(shot: Shot, paths: Sequence[LightPath], colors: Floats) -> Floa
     """
     packed, opening = shot.packed, shot.opening
     steps, view, axes = _steps(shot, paths)
-    middle = len(packed.n_gap) // 2
+    middle = [len(packed.n_gap) // 2]
     width, height = shot.size_px
-    seen = np.empty((len(paths), 2))
+    seen, angles = np.empty((len(paths), 1, 2)), np.empty((1, len(steps[0])))
     measure_matrix_ghosts(
-        *steps, packed.n_gap[middle], packed.reflectance[middle], packed.sensor_z, *view, opening.edges, opening.radius,
-        axes, shot.to_pixels, shot.gain, float(width), float(height), RIM, seen,
+        *steps, packed.n_gap[middle], packed.reflectance, np.array(middle), packed.sensor_z, *view, opening.edges,
+        opening.radius, axes, shot.to_pixels, shot.gain, float(width), float(height), RIM, seen, angles,
     )  # fmt: skip
     light: Floats = colors.sum(axis=1) @ luminance_weights(shot.colorspace)
-    return seen * light[:, None]
+    return seen[:, 0] * light[:, None]
 
 
 def draft_details(shots: Sequence[Shot], paths: Sequence[LightPath], colors: Sequence[Floats]) -> Indices:
