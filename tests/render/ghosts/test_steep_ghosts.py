@@ -12,7 +12,14 @@ from flarewright.model import Camera, Light, Project, Quality
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.optics.rays.bundle import Refinement, trace_bundle, trace_grid
 from flarewright.optics.rays.path_reflectance import CURVE_NM
-from flarewright.render.ghosts.steep_ghosts import ABRUPT_PART, _areas_between, ends, light_up_to_its_end, near_ends
+from flarewright.render.ghosts.steep_ghosts import (
+    ABRUPT_PART,
+    _areas_between,
+    ends,
+    gaps_at_ends,
+    light_up_to_its_end,
+    within_gaps,
+)
 from flarewright.render.ghosts.traced_ghosts import find_final
 from flarewright.render.scene.between_wavelengths import FINE_NM
 from flarewright.render.scene.opening import make_opening
@@ -58,10 +65,14 @@ def test_wavelengths_are_added_where_light_ends():
     assert not falls.any()
     # the gap that holds the end, and the next on its bright side
     within = np.arange(442.5, 480.0, 2.5)
-    assert CURVE_NM[near_ends(nm, rises, falls)].tolist() == within[within != 460.0].tolist()
+    assert (
+        CURVE_NM[within_gaps(nm, gaps_at_ends(rises, falls).any(axis=0))].tolist() == within[within != 460.0].tolist()
+    )
     rises, falls = ends(throughput[:, ::-1], ABRUPT_PART)
     within = np.arange(422.5, 460.0, 2.5)
-    assert CURVE_NM[near_ends(nm, rises, falls)].tolist() == within[within != 440.0].tolist()
+    assert (
+        CURVE_NM[within_gaps(nm, gaps_at_ends(rises, falls).any(axis=0))].tolist() == within[within != 440.0].tolist()
+    )
 
 
 @pytest.mark.parametrize("end", [0.03, 0.4, 0.97])

@@ -79,16 +79,18 @@ def throughput_between(reflectance, rows, actions, starts, squares, nodes, share
     """
     waves, count = through.shape[1], nodes.shape[0]
     last_place, last_cell = float(reflectance.shape[1] - 1), reflectance.shape[1] - 2
-    mirror = np.empty(waves)
-    # most shares are 0
-    places, used = np.empty((count, waves), np.int64), np.zeros(count, np.int64)
+    mirror, product = np.empty(waves), np.empty(waves)
+    # most shares are 0: runs of the others
+    runs, used = np.empty((count, waves, 2), np.int64), np.zeros(count, np.int64)
     for n in range(count):
         for m in range(waves):
             if shares[n, m] != 0.0:
-                places[n, used[n]] = m
-                used[n] += 1
+                if m == 0 or shares[n, m - 1] == 0.0:
+                    runs[n, used[n], 0] = m
+                    used[n] += 1
+                runs[n, used[n] - 1, 1] = m + 1
     for p in range(through.shape[0]):
-        through[p, :] = 1.0
+        product[:] = 1.0
         for step in range(starts[p], starts[p + 1]):
             if actions[step] == STOP:
                 continue
@@ -101,17 +103,18 @@ def throughput_between(reflectance, rows, actions, starts, squares, nodes, share
                     a, b, c, d = cubic_weights(place - first)
                     one, two, three, four = table[first], table[first + 1], table[first + 2], table[first + 3]
                     for k in range(used[n]):
-                        m = places[n, k]
-                        mirror[m] += shares[n, m] * (a * one[m] + b * two[m] + c * three[m] + d * four[m])
+                        for m in range(runs[n, k, 0], runs[n, k, 1]):
+                            mirror[m] += shares[n, m] * (a * one[m] + b * two[m] + c * three[m] + d * four[m])
                 for m in range(waves):
-                    through[p, m] *= mirror[m]
+                    product[m] *= mirror[m]
             else:
                 place = sqrt(1.0 - squares[step]) * last_place
                 cell = min(int(place), last_cell)
                 part = place - cell
                 low, high = table[cell], table[cell + 1]
                 for m in range(waves):
-                    through[p, m] *= 1.0 - low[m] - part * (high[m] - low[m])
+                    product[m] *= 1.0 - low[m] - part * (high[m] - low[m])
+        through[p, :] = product
 
 
 @inner

@@ -19,7 +19,7 @@ LEAST_PART = 1e-3
 # the error is estimated at every third wavelength
 EVERY = 3
 
-__all__ = ["bright_wavelengths", "interpolation_error", "throughput_ratios"]
+__all__ = ["bright_wavelengths", "gap_errors", "interpolation_error", "throughput_ratios"]
 
 
 def interpolation_error(
@@ -59,6 +59,41 @@ def interpolation_error(
     more = np.maximum(np.einsum("...w,wl->...l", throughput, bent), 0.0) - line
     error, total = (np.abs(np.einsum("...l,lc->...c", one * passed, light)).max(axis=-1) for one in (more, line))
     return error, total
+
+
+def gap_errors(passed: Floats, light: Floats, known_nm: Floats, throughput: Floats) -> tuple[Floats, Floats]:
+    """Estimate how much each gap between known wavelengths adds to the colour error of `interpolation_error`.
+
+    Parameters
+    ----------
+    passed : ndarray, shape (L,) or (P, L)
+    light : ndarray, shape (L, 3)
+    known_nm : ndarray, shape (M,)
+        Ascending.
+    throughput : ndarray, shape (P, M)
+
+    Returns
+    -------
+    errors, shares : ndarray, shape (P, M - 1)
+        The error and the light of each gap, relative to the largest channel of the path; 0 and 1 if there is no light.
+        Light beyond the known wavelengths counts with the first and the last gap.
+    """
+    straight, bent = _interpolations(tuple(known_nm), (True,) * len(known_nm))
+    coarse_nm = CURVE_NM[::EVERY]
+    light = _hats(tuple(coarse_nm)) @ light
+    line = np.einsum("pw,wl->pl", throughput, straight)
+    more = np.maximum(np.einsum("pw,wl->pl", throughput, bent), 0.0) - line
+    gap = np.clip(np.searchsorted(known_nm, coarse_nm) - 1, 0, len(known_nm) - 2)
+    parts = (np.eye(len(known_nm) - 1)[gap][:, :, None] * light[:, None]).reshape(len(light), -1)
+    errors, shares = (
+        np.einsum("pl,lk->pk", one * passed[..., ::EVERY], parts).reshape(len(one), -1, 3) for one in (more, line)
+    )
+    total = np.abs(shares.sum(axis=1)).max(axis=1)[:, None]
+    errors, shares = np.abs(errors).max(axis=2), np.abs(shares).max(axis=2)
+    return (
+        np.divide(errors, total, out=np.zeros_like(errors), where=total > 0.0),
+        np.divide(shares, total, out=np.ones_like(shares), where=total > 0.0),
+    )
 
 
 @lru_cache(maxsize=64)

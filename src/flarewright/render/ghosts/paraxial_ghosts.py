@@ -26,6 +26,7 @@ from ...optics.rays.path_reflectance import CURVE_NM, BandCurves, PathSpectrum, 
 from ...typing import Floats, Indices
 from ..image.canvas import DETAIL_CONTRAST, DETAILS, Plane, merge
 from ..scene.art_rules import PathArt
+from ..scene.between_wavelengths import STEEP
 from ..scene.paraxial_place import ghost_frame
 from ..scene.shot import Shot, at_fine_wavelengths
 from .art_filters import coarseness, filtered_ghost
@@ -37,9 +38,10 @@ from .steep_ghosts import (
     bent_weights,
     ends,
     light_up_to_its_end,
-    near_ends,
     over,
+    steep_gaps,
     steep_paths,
+    within_gaps,
 )
 
 # rounding error of sums of differences, relative to the largest value
@@ -109,7 +111,7 @@ def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
     if shot.between is None:
         return _plain_weights(shot, paths, _spectra(shot, paths, angles)[0])
     between = shot.between
-    fine_nm, (fine, bands), near = between.fine_nm, between.finer, between.beyond
+    fine_nm, (fine, bands), near = between.fine_nm, between.finer, between.beyond(packed.wavelengths_nm)
     beyond, more = _fluxes(shot, paths, fine.n_gap[near], fine.reflectance, near)
     angles = np.concatenate([angles, more])
     spectra, squares = _spectra(shot, paths, angles, fine_nm[near])
@@ -117,28 +119,29 @@ def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
     throughput = flux if spectra is None else over(flux, spectra.carried)
     carried = _carried(bands, paths, squares, more, near)
     known_nm, known = _merged((packed.wavelengths_nm, throughput), (fine_nm[near], over(beyond, carried)))
-    for chosen, much in zip(steep_paths(shot, known_nm, known, spectra), (False, True), strict=True):
+    little, much_steep = steep_paths(shot, known_nm, known, spectra)
+    if between.lines_nm is not None:
+        little, much_steep = little[:0], np.union1d(little, much_steep)
+    for chosen, much in ((little, False), (much_steep, True)):
         if chosen.size == 0:
             continue
         few = [paths[int(k)] for k in chosen]
         steps = _steps_of(paths, chosen)
-        waves = np.arange(len(fine_nm)) if much else between.steep
+        waves = np.arange(len(fine_nm)) if much else np.array(STEEP)
         # how much of a sliver lands in the picture depends on the polygon: take the one that is drawn
         sides = RIM if much else ENTRANCE_SIDES
         steep, more = _fluxes(shot, few, fine.n_gap[waves], fine.reflectance, waves, sides)
-        known_angles = np.concatenate([angles[:, steps], more])
-        own = _spectra(shot, few, known_angles, fine_nm[np.concatenate([near, waves])], squares[steps])[0]
         steep = over(steep, _carried(bands, few, squares[steps], more, waves))
         if much:
+            nodes_nm = fine_nm[np.concatenate([near, waves])]
+            own = _spectra(shot, few, np.concatenate([angles[:, steps], more]), nodes_nm, squares[steps])[0]
             drawn = _fluxes(shot, few, packed.n_gap, packed.reflectance, sides=RIM)[0]
-            traced, curve = drawn if own is None else over(drawn, own.carried), _curve(shot, few, squares[steps], steep)
+            traced = drawn if own is None else over(drawn, own.carried)
+            curve = _curve(shot, few, squares[steps], steep, own)
         else:
-            traced = throughput[chosen]
-            if between.lines_nm is None:
-                nm, steep = _merged((known_nm, known[chosen]), (fine_nm[waves], steep))
-                curve = steep @ hats(CURVE_NM, nm)
-            else:
-                curve = steep @ between.spread
+            own = None if spectra is None else PathSpectrum(spectra.passed[chosen], spectra.carried[chosen])
+            nm, steep = _merged((known_nm, known[chosen]), (fine_nm[waves], steep))
+            traced, curve = throughput[chosen], steep @ hats(CURVE_NM, nm)
         colors[chosen] = bent_weights(shot, traced, own, curve)
     # flux under total reflection is rounding error
     light = beyond.max(axis=1)
@@ -172,7 +175,7 @@ def _with_hidden(
     spectra, squares = _spectra(fine, few, angles)
     throughput = over(flux_there[seen], _carried(fine.curves, few, squares, angles, waves))
     more, colors = np.zeros((len(paths), len(fine_nm), 3)), colors.copy()
-    more[hidden[seen]] = bent_weights(fine, throughput, spectra, _curve(shot, few, squares, throughput))
+    more[hidden[seen]] = bent_weights(fine, throughput, spectra, _curve(shot, few, squares, throughput, spectra))
     colors[hidden[seen]] = 0.0
     return np.concatenate([colors, more], axis=1)
 
@@ -211,8 +214,10 @@ def _carried(
     return products_between(bands.means[:, :, near], paths, squares, angles, np.eye(len(near)))
 
 
-def _curve(shot: Shot, paths: Sequence[LightPath], squares: Floats, throughput: Floats) -> Floats:
-    """Return the throughput of paths at `CURVE_NM`; where the light of a path ends, it is computed there.
+def _curve(
+    shot: Shot, paths: Sequence[LightPath], squares: Floats, throughput: Floats, spectra: PathSpectrum | None
+) -> Floats:
+    """Return the throughput of paths at `CURVE_NM`; where it is steep or ends, it is computed there.
 
     Parameters
     ----------
@@ -222,6 +227,8 @@ def _curve(shot: Shot, paths: Sequence[LightPath], squares: Floats, throughput: 
         From `_spectra`.
     throughput : ndarray, shape (P, M)
         At `Between.fine_nm`.
+    spectra : PathSpectrum or None
+        Of the paths.
 
     Returns
     -------
@@ -234,11 +241,11 @@ def _curve(shot: Shot, paths: Sequence[LightPath], squares: Floats, throughput: 
     if between.lines_nm is not None:
         return curve
 
-    rises, falls = ends(throughput)
-    for k in np.flatnonzero((rises | falls).any(axis=1)):
-        own, steps = [paths[k]], squares[_steps_of(paths, k[None])]
+    steep = steep_gaps(shot, between.fine_nm, throughput, spectra)
+    for k in np.flatnonzero(steep.any(axis=1)).tolist():
+        own, steps = [paths[k]], squares[_steps_of(paths, np.array([k]))]
 
-        more = near_ends(between.fine_nm, rises[[k]], falls[[k]])
+        more = within_gaps(between.fine_nm, steep[k])
         flux, angles = _fluxes(shot, own, n_gap[more], fine.reflectance, nearest[more], RIM)
         curve[k, more] = over(flux, _carried(bands, own, steps, angles, nearest[more]))[0]
         # a curve's wavelengths lie too far apart to resolve an end

@@ -24,7 +24,7 @@ from ...model.project.light import Spectrum
 from ...optics.colour.spectrum import band_parts
 from ...optics.rays.bundle import Bundle, trace_bundle
 from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum
-from ...optics.rays.steepness import bright_wavelengths, interpolation_error, throughput_ratios
+from ...optics.rays.steepness import bright_wavelengths, gap_errors, interpolation_error, throughput_ratios
 from ...typing import Floats, Mask
 from ..scene.path_color import visible_rays
 from ..scene.shot import Shot
@@ -32,7 +32,9 @@ from ..scene.shot import Shot
 # lowest expected colour error for a correction, relative to the ghost's largest channel
 COLOR_ERROR, DRAFT_COLOR_ERROR = 0.009, 0.0077
 # above this error a few wavelengths do not suffice for the colour correction
-LARGE_ERROR = 0.05
+LARGE_ERROR = 0.02
+# above this error a gap between fine wavelengths is resolved
+GAP_ERROR = 0.003
 # a throughput below this part of the largest counts as zero, so the ghost ends within the spectrum
 DARK_PART = 1e-3
 # ghosts whose throughput changes less than this between ends and middle of the spectrum, relative, are not steep
@@ -52,12 +54,14 @@ __all__ = [
     "bent_spectrum",
     "bent_weights",
     "ends",
+    "gaps_at_ends",
     "light_up_to_its_end",
-    "near_ends",
     "over",
     "seen_light",
+    "steep_gaps",
     "steep_paths",
     "steepness",
+    "within_gaps",
 ]
 
 
@@ -262,24 +266,47 @@ def ends(throughput: Floats, least: float = DARK_PART) -> tuple[Mask, Mask]:
     return dark[:, :-1] & bright[:, 1:], bright[:, :-1] & dark[:, 1:]
 
 
-def near_ends(fine_nm: Floats, rises: Mask, falls: Mask) -> NDArray[np.intp]:
-    """Return which wavelengths of `CURVE_NM` lie in gaps where light ends, or next to them, where it changes fast.
+def gaps_at_ends(rises: Mask, falls: Mask) -> Mask:
+    """Return the gaps in which the light of paths ends, and the next, where it changes fast, shape (P, M - 1).
+
+    Parameters
+    ----------
+    rises, falls : ndarray, shape (P, M - 1), bool
+        From `ends`.
+    """
+    gaps = rises | falls
+    gaps[:, 1:] |= rises[:, :-1]
+    gaps[:, :-1] |= falls[:, 1:]
+    return gaps
+
+
+def steep_gaps(shot: Shot, fine_nm: Floats, throughput: Floats, spectra: PathSpectrum | None) -> Mask:
+    """Return the gaps in which a line between the fine wavelengths is not good enough, shape (P, M - 1).
+
+    Parameters
+    ----------
+    shot : Shot
+    fine_nm : ndarray, shape (M,)
+        Rising.
+    throughput : ndarray, shape (P, M)
+        At these.
+    spectra : PathSpectrum or None
+        Of the paths.
+    """
+    passed = np.ones(len(CURVE_NM)) if spectra is None else spectra.passed
+    errors, shares = gap_errors(passed, seen_light(shot), fine_nm, throughput)
+    gently, abruptly = (gaps_at_ends(*ends(throughput, least)) for least in (DARK_PART, ABRUPT_PART))
+    return abruptly | (gently & (shares > GAP_ERROR)) | (errors > GAP_ERROR)
+
+
+def within_gaps(fine_nm: Floats, gaps: Mask) -> NDArray[np.intp]:
+    """Return which of `CURVE_NM` lie within some gaps between rising wavelengths.
 
     Parameters
     ----------
     fine_nm : ndarray, shape (M,)
-        Rising.
-    rises, falls : ndarray, shape (P, M - 1), bool
-        From `ends`.
-
-    Returns
-    -------
-    ndarray of int
-        Between `fine_nm`, of all paths.
+    gaps : ndarray, shape (M - 1,), bool
     """
-    gaps: Mask = np.any(rises | falls, axis=0)
-    gaps[1:] |= rises[:, :-1].any(axis=0)
-    gaps[:-1] |= falls[:, 1:].any(axis=0)
     within = (fine_nm[0] < CURVE_NM) & (fine_nm[-1] > CURVE_NM)
     inner = np.flatnonzero(within & ~np.isin(CURVE_NM, fine_nm))
     found: NDArray[np.intp] = inner[gaps[np.searchsorted(fine_nm, CURVE_NM[inner]) - 1]]

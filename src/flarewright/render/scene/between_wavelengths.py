@@ -24,6 +24,8 @@ FINE_NM = np.array([
 # half of the light below 450 nm lies below the first); and what steep ghosts need besides, where films' reflectance
 # changes most
 BEYOND, STEEP = [2, 19], [5, 17, 20]
+# of a light of few lines, how many beyond the traced wavelengths drafts compute at most; closer lines count as one
+MOST_BEYOND, CLOSE_NM = 5, 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,15 +64,17 @@ class Between:
         """Wavelengths that show how the throughput of a path changes: `FINE_NM`, or all that a few lines have."""
         return FINE_NM if self.lines_nm is None else self.lines_nm
 
-    @cached_property
-    def beyond(self) -> Indices:
-        """Which of them drafts compute for all ghosts: towards the ends of the light."""
-        return np.array(BEYOND if self.lines_nm is None else [0, len(self.lines_nm) - 1])
-
-    @cached_property
-    def steep(self) -> Indices:
-        """Which of them drafts compute for ghosts that are a little steep."""
-        return np.array(STEEP) if self.lines_nm is None else np.arange(len(self.lines_nm))
+    def beyond(self, traced_nm: Floats) -> Indices:
+        """Return which of them drafts compute for all ghosts besides those traced: towards the ends of the light."""
+        if self.lines_nm is None:
+            return np.array(BEYOND)
+        chosen: list[int] = []
+        known = traced_nm.tolist()
+        for k in np.flatnonzero((self.lines_nm < traced_nm[0]) | (self.lines_nm > traced_nm[-1])).tolist():
+            if np.abs(np.array(known) - self.lines_nm[k]).min() > CLOSE_NM and len(chosen) < MOST_BEYOND:
+                chosen.append(k)
+                known.append(float(self.lines_nm[k]))
+        return np.array(chosen, dtype=np.intp)
 
     @cached_property
     def nearest(self) -> Indices:
