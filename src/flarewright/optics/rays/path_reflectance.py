@@ -228,7 +228,7 @@ def path_spectra(curves: BandCurves, paths: Sequence[LightPath], squares: Floats
     paths : sequence of LightPath
     squares : ndarray, shape (N, steps)
         Of N rays per path: squared sines on the side of the lower index at the steps of all concatenated paths
-        (`step_squares`, `kernels.paraxial.ghosts.matrix_squares`).
+        (`step_squares`).
 
     Returns
     -------

@@ -46,6 +46,8 @@ from .steep_ghosts import (
 
 # rounding error of sums of differences, relative to the largest value
 ROUNDING = 1e-12
+# squared sine above which transmittance changes fast with the angle; 1 is total reflection
+CRITICAL = 0.8
 # an offset larger than the distance of any ghost from the picture, pixels
 FAR_PX = 10**7
 # straight edges of the round entrance for comparing fluxes
@@ -114,7 +116,7 @@ def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
     fine_nm, (fine, bands), near = between.fine_nm, between.finer, between.beyond(packed.wavelengths_nm)
     beyond, more = _fluxes(shot, paths, fine.n_gap[near], fine.reflectance, near)
     angles = np.concatenate([angles, more])
-    spectra, squares = _spectra(shot, paths, angles, fine_nm[near])
+    spectra, squares = _spectra(shot, paths, angles, fine_nm[near], _transmitted(paths, angles))
     colors = _plain_weights(shot, paths, spectra)
     throughput = flux if spectra is None else over(flux, spectra.carried)
     carried = _carried(bands, paths, squares, more, near)
@@ -257,6 +259,8 @@ def _curve(
                 at = partial(_flux_between, shot, own, n_gap[low], n_gap[high], nearest[[low]])
                 # relative to the bright bound, because rays carry nearly the same within a gap
                 bright_flux = at(0.0)
+                if not bright_flux > 0.0:
+                    continue
                 scale = at_curve[0, low] / bright_flux
                 lit, unlit = (scale * part for part in light_up_to_its_end(bright_flux, at))
                 # by linear interpolation each bound has half of its value
@@ -313,16 +317,18 @@ def _shares(nodes_nm: tuple[float, ...], traced_nm: tuple[float, ...]) -> Floats
 
 
 def _transmitted(paths: Sequence[LightPath], angles: Floats) -> Floats:
-    """Return the angles, (W, steps), of the middle wavelength, or of the nearest whose ray is not totally reflected."""
-    middle = len(angles) // 2
-    squares: Floats = angles[middle].copy()
+    """Return the angles, (steps,), of the middle wavelength, or of the one whose ray is farthest from total reflection.
+
+    `angles` has shape (W, steps).
+    What passes at a fixed angle ends where total reflection begins at it, so this angle must be far from it. That rays
+    of other colours are closer to it is a part of their throughput.
+    """
+    squares: Floats = angles[len(angles) // 2].copy()
     _, actions, starts = joined_steps(tuple(paths))
-    lost = np.maximum.reduceat(np.where(actions == REFRACT, angles, 0.0), starts[:-1], axis=1) >= 1.0
-    for p in np.flatnonzero(lost[middle]).tolist():
-        for w in sorted(range(len(angles)), key=lambda w: abs(w - middle)):
-            if not lost[w, p]:
-                squares[starts[p] : starts[p + 1]] = angles[w, starts[p] : starts[p + 1]]
-                break
+    most = np.maximum.reduceat(np.where(actions == REFRACT, angles, 0.0), starts[:-1], axis=1)
+    least = most.argmin(axis=0)
+    for p in np.flatnonzero(most[len(angles) // 2] > CRITICAL).tolist():
+        squares[starts[p] : starts[p + 1]] = angles[least[p], starts[p] : starts[p + 1]]
     return squares
 
 
