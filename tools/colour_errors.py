@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flarewright.kernels.paraxial.ghosts import RIM
 from flarewright.kernels.raster.bundle import draw_bundle, node_densities
 from flarewright.kernels.raster.polygons import sum_rows
 from flarewright.model import (
@@ -50,7 +51,7 @@ from flarewright.optics.lens.paths import LightPath, ghost_paths
 from flarewright.optics.rays.bundle import Refinement, trace_bundle, trace_grid
 from flarewright.optics.rays.pack import facing, resolve_coatings
 from flarewright.optics.rays.torn_cells import cut_failed_triangles
-from flarewright.render.ghosts.paraxial_ghosts import draft_colors, draw_draft
+from flarewright.render.ghosts.paraxial_ghosts import draft_colors, draw_draft, matrix_fluxes
 from flarewright.render.ghosts.traced_ghosts import find_final
 from flarewright.render.image.canvas import blank, merge
 from flarewright.render.render import render
@@ -179,19 +180,9 @@ def at_lines(scene: Scene, nm: Floats, mode: str) -> tuple[Shot, tuple[LightPath
     return replace(shot, packed=packed, curves=None, between=None), tuple(ghost_paths(settled.lens))
 
 
-def draft_fluxes(shot: Shot, paths: Sequence[LightPath], nm: Floats) -> Floats:
-    """Draw drafts at lines; return the flux of each path at each, (P, N)."""
-    flux = np.empty((len(paths), len(nm)))
-    whole = shot.packed
-    # three lines at once, one a channel
-    for first in range(0, len(nm), 3):
-        waves = slice(first, min(first + 3, len(nm)))
-        packed = replace(whole, n_gap=whole.n_gap[waves], reflectance=whole.reflectance[waves])
-        few = replace(shot, packed=replace(packed, wavelengths_nm=nm[waves]))
-        colors = np.eye(3)[None, : len(nm[waves])]
-        for k, path in enumerate(paths):
-            flux[k, waves] = drawn(few, path, colors)[: len(nm[waves])]
-    return flux
+def draft_fluxes(shot: Shot, paths: Sequence[LightPath]) -> Floats:
+    """Return the flux of the polygons that drafts draw, of each path at each line, (P, N)."""
+    return shot.gain * matrix_fluxes(shot, paths, shot.packed.n_gap, shot.packed.reflectance, sides=RIM)[0]
 
 
 def drawn(shot: Shot, path: LightPath, colors: Floats) -> Floats:
@@ -246,7 +237,7 @@ class Judge:
     """Exact sums of all ghosts of a scene, under any light of `LIGHTS`."""
 
     def __init__(self, scene: Scene, mode: str) -> None:
-        self.scene, self.mode, self.fluxes = scene, mode, draft_fluxes if mode == "draft" else final_fluxes
+        self.scene, self.mode = scene, mode
         if mode == "draft":
             edges = np.linspace(*LIGHT_NM, DRAFT_CELLS + 1)
         else:
@@ -264,7 +255,8 @@ class Judge:
     def at(self, nm: Floats, names: Sequence[str] | None = None) -> Floats:
         """Return the flux at lines, (P, N)."""
         shot, paths = at_lines(self.scene, nm, self.mode)
-        return self.fluxes(shot, [path for path in paths if names is None or path.name in names], nm)
+        few = [path for path in paths if names is None or path.name in names]
+        return draft_fluxes(shot, few) if self.mode == "draft" else final_fluxes(shot, few, nm)
 
     def sums(self, spectrum: Spectrum) -> Floats:
         """Return the sums of all ghosts, (P, 3)."""

@@ -109,12 +109,12 @@ def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
     packed = shot.packed
     if not paths:
         return np.zeros((0, len(packed.wavelengths_nm), 3))
-    flux, angles = _fluxes(shot, paths, packed.n_gap, packed.reflectance)
+    flux, angles = matrix_fluxes(shot, paths, packed.n_gap, packed.reflectance)
     if shot.between is None:
         return _plain_weights(shot, paths, _spectra(shot, paths, angles)[0])
     between = shot.between
     fine_nm, (fine, bands), near = between.fine_nm, between.finer, between.beyond(packed.wavelengths_nm)
-    beyond, more = _fluxes(shot, paths, fine.n_gap[near], fine.reflectance, near)
+    beyond, more = matrix_fluxes(shot, paths, fine.n_gap[near], fine.reflectance, near)
     angles = np.concatenate([angles, more])
     spectra, squares = _spectra(shot, paths, angles, fine_nm[near], _transmitted(paths, angles))
     colors = _plain_weights(shot, paths, spectra)
@@ -132,12 +132,12 @@ def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
         waves = np.arange(len(fine_nm)) if much else np.array(STEEP)
         # how much of a sliver lands in the picture depends on the polygon: take the one that is drawn
         sides = RIM if much else ENTRANCE_SIDES
-        steep, more = _fluxes(shot, few, fine.n_gap[waves], fine.reflectance, waves, sides)
+        steep, more = matrix_fluxes(shot, few, fine.n_gap[waves], fine.reflectance, waves, sides)
         steep = over(steep, _carried(bands, few, squares[steps], more, waves))
         if much:
             nodes_nm = fine_nm[np.concatenate([near, waves])]
             own = _spectra(shot, few, np.concatenate([angles[:, steps], more]), nodes_nm, squares[steps])[0]
-            drawn = _fluxes(shot, few, packed.n_gap, packed.reflectance, sides=RIM)[0]
+            drawn = matrix_fluxes(shot, few, packed.n_gap, packed.reflectance, sides=RIM)[0]
             traced = drawn if own is None else over(drawn, own.carried)
             curve = _curve(shot, few, squares[steps], steep, own)
         else:
@@ -165,7 +165,7 @@ def _with_hidden(
     fine_nm = fine.packed.wavelengths_nm
     waves = np.arange(len(fine_nm))
     own = [paths[int(k)] for k in hidden]
-    flux_there, angles = _fluxes(fine, own, fine.packed.n_gap, fine.packed.reflectance, sides=RIM)
+    flux_there, angles = matrix_fluxes(fine, own, fine.packed.n_gap, fine.packed.reflectance, sides=RIM)
     light, beyond = (
         np.abs((of[:, :, None] * in_channels).sum(axis=1)).max(axis=1)
         for of, in_channels in ((flux, colors), (flux_there, fine.weights(fine_nm)))
@@ -207,7 +207,7 @@ def _carried(
     squares : ndarray, shape (steps,)
         From `_spectra`.
     angles : ndarray, shape (M, steps)
-        From `_fluxes`.
+        From `matrix_fluxes`.
     near : ndarray of int, shape (M,)
         Wavelengths of `bands`.
     """
@@ -248,7 +248,7 @@ def _curve(
         own, steps = [paths[k]], squares[_steps_of(paths, np.array([k]))]
 
         more = within_gaps(between.fine_nm, steep[k])
-        flux, angles = _fluxes(shot, own, n_gap[more], fine.reflectance, nearest[more], RIM)
+        flux, angles = matrix_fluxes(shot, own, n_gap[more], fine.reflectance, nearest[more], RIM)
         curve[k, more] = over(flux, _carried(bands, own, steps, angles, nearest[more]))[0]
         # a curve's wavelengths lie too far apart to resolve an end
         at_curve = curve[[k]]
@@ -273,7 +273,7 @@ def _flux_between(shot: Shot, path: list[LightPath], low: Floats, high: Floats, 
     """Compute the flux of one path where indices lie between two sets, with the mean reflectances of one wavelength."""
     assert shot.between is not None
     reflectance = shot.between.finer[0].reflectance
-    return float(_fluxes(shot, path, (low + part * (high - low))[None], reflectance, near, RIM)[0][0, 0])
+    return float(matrix_fluxes(shot, path, (low + part * (high - low))[None], reflectance, near, RIM)[0][0, 0])
 
 
 def _spectra(
@@ -286,7 +286,7 @@ def _spectra(
     shot : Shot
     paths : sequence of LightPath
     angles : ndarray, shape (W + N, steps)
-        From `_fluxes`, at the traced wavelengths and at others.
+        From `matrix_fluxes`, at the traced wavelengths and at others.
     more_nm : ndarray, shape (N,), optional
         These other wavelengths.
     squares : ndarray, shape (steps,), optional
@@ -332,7 +332,7 @@ def _transmitted(paths: Sequence[LightPath], angles: Floats) -> Floats:
     return squares
 
 
-def _fluxes(
+def matrix_fluxes(
     shot: Shot, paths: Sequence[LightPath], n_gap: Floats, reflectance: Floats, near: Indices | None = None,
     sides: int = ENTRANCE_SIDES,
 ) -> tuple[Floats, Floats]:  # fmt: skip
