@@ -13,6 +13,7 @@ from flarewright.optics.colour.rgb import xyz_to_rgb_matrix
 from flarewright.optics.colour.spectrum import (
     band_weights,
     cie_1931,
+    cubics,
     planck,
     spectral_power,
     spectrum_xyz,
@@ -153,3 +154,17 @@ def test_lines_are_traced_at_themselves_where_they_are_no_more_than_the_waveleng
     assert traced_wavelengths(count, mercury).tolist() == [435.833, 546.074, 578.0]
     # with one wavelength fewer than lines, wavelengths represent ranges again
     assert traced_wavelengths(2, mercury).tolist() == traced_wavelengths(2).tolist()
+
+
+def test_cubics_reproduce_cubic_curves_and_are_constant_beyond():
+    nodes = np.array([360.0, 362.5, 366.0, 370.0, 372.5, 380.0])
+    places = np.linspace(355.0, 385.0, 61)
+    weights = cubics(places, nodes)
+    inside = np.clip(places, nodes[0], nodes[-1])
+    for power in range(4):
+        np.testing.assert_allclose(((nodes - 370.0) ** power) @ weights, (inside - 370.0) ** power, atol=1e-9)
+    assert ((weights != 0.0).sum(axis=0) <= 4).all()
+    # too few nodes for a cubic: lines
+    assert cubics(np.array([1.25]), [1.0, 2.0]).ravel().tolist() == [0.75, 0.25]
+    with pytest.raises(ValueError, match="rise"):
+        cubics(places, nodes[::-1])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flarewright.kernels.tracing.sequential import ALIVE, REL, WEIGHT
-from flarewright.model import D65, AsLens, Everywhere, QuarterWave
+from flarewright.model import D65, AsLens, Everywhere, QuarterWave, Standard
 from flarewright.optics.coatings.thin_film import film_stack, stack_reflectance
 from flarewright.optics.colour.spectrum import hats
 from flarewright.optics.lens.dispersion import refractive_index
@@ -14,7 +14,14 @@ from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.paths import ghost_path, sensor_path
 from flarewright.optics.rays.bundle import trace_points
 from flarewright.optics.rays.pack import SensorMirror, facing, pack_lens, resolve_coatings
-from flarewright.optics.rays.path_reflectance import CURVE_NM, band_curves, coating_curves, path_spectra, step_squares
+from flarewright.optics.rays.path_reflectance import (
+    CURVE_NM,
+    band_curves,
+    coating_curves,
+    path_spectra,
+    products_between,
+    step_squares,
+)
 from flarewright.optics.rays.pupil_region import find_region
 from flarewright.render.scene.resolve import load_lens
 
@@ -56,19 +63,13 @@ def test_a_ray_passes_what_its_curve_says(name, first, second):
         assert np.abs(reported - carried).max() < 0.012 * carried.max()
 
 
-def test_a_curve_is_the_product_of_its_films():
-    lens = load_lens("tessar-brendel")
-    coatings = resolve_coatings(lens, FILM)
-    curves = banded(lens, coatings)
-    path = ghost_path(lens, 7, 2)
-    random = np.random.default_rng(5)
-    squares = random.uniform(0.0, 0.5, (2, len(path.rows)))
-    got = path_spectra(curves, [path], squares).passed[0]
+def films_of(lens, coatings):
+    """Return a function for R of a row from its films, at `CURVE_NM`: not from tables."""
     media = [None]
     for row in lens.rows:
         media.append(media[-1] if row is lens.rows[lens.stop_row] else row.medium)
 
-    def reflected(row: int, square: float) -> np.ndarray:
+    def reflected(row: int, square) -> np.ndarray:
         n_d = [1.0 if medium is None else medium.n_d for medium in media[row : row + 2]]
         films = film_stack(coatings[row], *n_d)
         low, high = (refractive_index(medium, CURVE_NM) for medium in media[row : row + 2])
@@ -76,6 +77,17 @@ def test_a_curve_is_the_product_of_its_films():
             low, high, films = high, low, (films[0][::-1], films[1][::-1])
         return stack_reflectance(low, high, *films, CURVE_NM, np.sqrt(1.0 - square))
 
+    return reflected
+
+
+def test_a_curve_is_the_product_of_its_films():
+    lens = load_lens("tessar-brendel")
+    coatings = resolve_coatings(lens, FILM)
+    curves, reflected = banded(lens, coatings), films_of(lens, coatings)
+    path = ghost_path(lens, 7, 2)
+    random = np.random.default_rng(5)
+    squares = random.uniform(0.0, 0.5, (2, len(path.rows)))
+    got = path_spectra(curves, [path], squares).passed[0]
     expected = np.zeros(len(CURVE_NM))
     for ray in squares:
         part = np.ones(len(CURVE_NM))
@@ -86,6 +98,48 @@ def test_a_curve_is_the_product_of_its_films():
             part *= r if action == 1 else 1.0 - r
         expected += 0.5 * part
     np.testing.assert_allclose(got, expected, rtol=0.0, atol=5e-4 * expected.max())
+
+
+@pytest.mark.parametrize("square", [0.02, 0.045, 0.08])
+def test_what_films_reflect_near_their_zero_is_right_too(square):
+    """A light of few wavelengths may have no others; lines between the tables' angles make P up to 10 % too large."""
+    lens = load_lens("flektogon-35")
+    coatings = resolve_coatings(lens, Everywhere(coating=Standard(name="early-multicoat")))
+    curves, reflected = banded(lens, coatings), films_of(lens, coatings)
+    path = ghost_path(lens, 3, 1)
+    got = path_spectra(curves, [path], np.full((1, len(path.rows)), square)).passed[0]
+    expected = np.ones(len(CURVE_NM))
+    for row, action in zip(path.rows, path.actions, strict=True):
+        if row != lens.stop_row:
+            r = reflected(int(row), square)
+            expected *= r if action == 1 else 1.0 - r
+    assert expected.min() < 1e-3 * expected.max()
+    np.testing.assert_allclose(got, expected, rtol=2e-3)
+
+
+def test_mirrors_reflect_at_the_angles_of_each_wavelength():
+    lens = load_lens("tessar-brendel")
+    coatings = resolve_coatings(lens, FILM)
+    curves, reflected = banded(lens, coatings), films_of(lens, coatings)
+    path = ghost_path(lens, 7, 2)
+    random = np.random.default_rng(8)
+    squares, nodes = random.uniform(0.0, 0.4, len(path.rows)), random.uniform(0.0, 0.4, (3, len(path.rows)))
+    shares = hats(CURVE_NM, [400.0, 550.0, 700.0])
+    reflectance = curves.reflectance[:, :, : len(CURVE_NM)]
+    got = products_between(reflectance, [path, path], np.tile(squares, 2), np.tile(nodes, 2), shares)
+    expected = np.ones(len(CURVE_NM))
+    for k, (row, action) in enumerate(zip(path.rows, path.actions, strict=True)):
+        if row == lens.stop_row:
+            continue
+        if action == 1:
+            expected *= sum(share * reflected(int(row), node[k]) for share, node in zip(shares, nodes, strict=True))
+        else:
+            expected *= 1.0 - reflected(int(row), squares[k])
+    np.testing.assert_allclose(got[0], expected, rtol=0.0, atol=5e-4 * expected.max())
+    np.testing.assert_array_equal(got[0], got[1])
+    # one angle for all wavelengths
+    one = products_between(reflectance, [path], squares, np.tile(squares, (3, 1)), shares)
+    np.testing.assert_allclose(one[0], path_spectra(curves, [path], squares[None]).passed[0], rtol=1e-12)
 
 
 @pytest.mark.parametrize("waves", [SEVEN_NM, (450.0, 540.0, 610.0), (550.0,)])

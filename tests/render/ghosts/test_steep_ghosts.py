@@ -12,7 +12,15 @@ from flarewright.model import Camera, Light, Project, Quality
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.optics.rays.bundle import Refinement, trace_bundle, trace_grid
 from flarewright.optics.rays.path_reflectance import CURVE_NM
-from flarewright.render.ghosts.steep_ghosts import _areas_between, abrupt_ends, light_up_to_its_end, near_ends
+from flarewright.render.ghosts.paraxial_ghosts import matrix_fluxes
+from flarewright.render.ghosts.steep_ghosts import (
+    ABRUPT_PART,
+    _areas_between,
+    ends,
+    gaps_at_ends,
+    light_up_to_its_end,
+    within_gaps,
+)
 from flarewright.render.ghosts.traced_ghosts import find_final
 from flarewright.render.scene.between_wavelengths import FINE_NM
 from flarewright.render.scene.opening import make_opening
@@ -53,15 +61,19 @@ def test_wavelengths_are_added_where_light_ends():
         [0.0, 0.0, 0.0, 0.6, 0.8, 1.0],
         [0.3, 0.2, 0.1, 0.02, 0.0, 0.0],
     ])  # fmt: skip
-    rises, falls = abrupt_ends(throughput)
+    rises, falls = ends(throughput, ABRUPT_PART)
     assert np.argwhere(rises).tolist() == [[1, 2]]
     assert not falls.any()
     # the gap that holds the end, and the next on its bright side
     within = np.arange(442.5, 480.0, 2.5)
-    assert CURVE_NM[near_ends(nm, rises, falls)].tolist() == within[within != 460.0].tolist()
-    rises, falls = abrupt_ends(throughput[:, ::-1])
+    assert (
+        CURVE_NM[within_gaps(nm, gaps_at_ends(rises, falls).any(axis=0))].tolist() == within[within != 460.0].tolist()
+    )
+    rises, falls = ends(throughput[:, ::-1], ABRUPT_PART)
     within = np.arange(422.5, 460.0, 2.5)
-    assert CURVE_NM[near_ends(nm, rises, falls)].tolist() == within[within != 440.0].tolist()
+    assert (
+        CURVE_NM[within_gaps(nm, gaps_at_ends(rises, falls).any(axis=0))].tolist() == within[within != 440.0].tolist()
+    )
 
 
 @pytest.mark.parametrize("end", [0.03, 0.4, 0.97])
@@ -73,3 +85,25 @@ def test_the_light_of_a_gap_is_integrated_up_to_its_end(end, power):
     moment = end ** (power + 2.0) / ((power + 1.0) * (power + 2.0))
     assert near + far == pytest.approx(whole, abs=0.02)
     assert far == pytest.approx(moment, abs=0.02)
+
+
+def test_the_ray_of_a_draft_moves_steadily_from_the_middle_of_the_iris_to_that_of_the_entrance():
+    """Its angles have no jump, and its height is the middle of what passes both rims."""
+    project = Project(
+        lens="nikon-28-75", f_number=4.0, lights=(Light(field_deg=(18.0, 3.0)),), camera=Camera(size_px=(96, 54)),
+        quality=Quality(mode="draft", wavelengths=3),
+    )  # fmt: skip
+    settled = resolve_project(project)
+    (shot,) = make_shots(settled, make_opening(settled, None))
+    paths = list(ghost_paths(settled.lens))
+    radii = np.linspace(0.2, 3.0, 141) * shot.opening.radius
+    middle = shot.packed.n_gap[1:2]
+    angles = np.concatenate([
+        matrix_fluxes(replace(shot, opening=replace(shot.opening, radius=r)), paths, middle, shot.packed.reflectance)[1]
+        for r in radii
+    ])  # fmt: skip
+    change = np.ptp(angles, axis=0)
+    steps = np.abs(np.diff(angles, axis=0)).max(axis=0)
+    moved = change > 0.05
+    assert moved.sum() > 100
+    assert (steps[moved] < 0.3 * change[moved]).all()

@@ -178,30 +178,6 @@ def _fill_sines(rows, actions, lens, curvature_x, light, iris_radius, to_stop, a
 
 
 @compiled
-def matrix_squares(paths, lens, curvature_x, light, iris_radius, squares):
-    """Compute the angles of incidence of the rays from which `draw_matrix_ghosts` takes the ghosts' colours.
-
-    Parameters
-    ----------
-    paths : PathList
-    lens : MeridianLens
-        At one wavelength.
-    curvature_x, light
-        As in `draw_matrix_ghosts`.
-    iris_radius : float
-    squares : ndarray, shape (steps,)
-        Filled with the squared sine on the lower-index side at each step of each path (`paraxial_sines`).
-    """
-    to_stop = np.empty((MOST_CROSSINGS, 2, 2))
-    across = to_stop if curvature_x is None else np.empty((MOST_CROSSINGS, 2, 2))
-    for p in range(paths.starts.size - 1):
-        first, end = paths.starts[p], paths.starts[p + 1]
-        rows, actions = paths.rows[first:end], paths.actions[first:end]
-        _meridians(rows, actions, lens, curvature_x, light.nearness, paths.crossings[p], to_stop, across)
-        _fill_sines(rows, actions, lens, curvature_x, light, iris_radius, to_stop, across, squares[first:end])
-
-
-@compiled
 def draw_matrix_ghosts(paths, lens, curvature_x, light, iris, mask, frame, rgb, plane):
     """Draw the ghosts of many paths at many wavelengths by matrices (Lee and Eisemann 2013; Van Acoleyen 2025, ch. 4).
 
@@ -225,7 +201,7 @@ def draw_matrix_ghosts(paths, lens, curvature_x, light, iris, mask, frame, rgb, 
     Notes
     -----
     A ghost is the image of the entrance cut by the iris: a polygon of constant irradiance. Its colour is that of one
-    ray, through the centre of the iris or, where the entrance bounds the ghost, of the entrance.
+    ray, through the middle of the part of the entrance whose light passes the iris.
     """
     height, width = plane.shape[0], plane.shape[1]
     values = np.empty(MAX_VERTICES)
@@ -237,7 +213,9 @@ def draw_matrix_ghosts(paths, lens, curvature_x, light, iris, mask, frame, rgb, 
     for p in range(paths.starts.size - 1):
         crossings = paths.crossings[p]
         for w in range(lens.n_gap.shape[0]):
-            count, even = _place_ghost(paths, p, _lens_at(lens, w), curvature_x, light, iris, frame, work)
+            count, even = _place_ghost(
+                paths, p, _lens_at(lens, w, w), curvature_x, light, iris, frame, work, work.squares
+            )
             if count == 0:
                 continue
             even *= frame.gain
@@ -254,34 +232,43 @@ def draw_matrix_ghosts(paths, lens, curvature_x, light, iris, mask, frame, rgb, 
 
 
 @compiled
-def measure_matrix_ghosts(paths, lens, curvature_x, light, iris, frame, width, height, sides, found):
-    """Compute the irradiance of the ghosts of `draw_matrix_ghosts` and their flux in the picture.
+def measure_matrix_ghosts(
+    paths, lens, near, curvature_x, light, iris, frame, width, height, sides, found, squares,
+):  # fmt: skip
+    """Compute the irradiance of the ghosts of `draw_matrix_ghosts`, their flux in the picture and their rays' angles.
 
     Parameters
     ----------
     paths : PathList
     lens : MeridianLens
-        At one wavelength.
+        With the indices of M wavelengths, and the reflectances of W, which need not be the same.
+    near : ndarray, shape (M,), int64
+        Which of the W reflectances the rays of each wavelength have.
     curvature_x, light, iris, frame
         As in `draw_matrix_ghosts`.
     width, height : float
         Pixels.
     sides : int
         Edges of the polygon for the round rim of the entrance; `draw_matrix_ghosts` uses `RIM`.
-    found : ndarray, shape (P, 2)
+    found : ndarray, shape (P, M, 2)
         Filled with the flux inside the picture and the flux per pixel inside the ghost.
+    squares : ndarray, shape (M, steps)
+        Filled with the squared sine on the lower-index side at each step of each path (`paraxial_sines`), of the rays
+        from which the colours are taken.
     """
     values = np.empty(MAX_VERTICES)
     other = np.zeros((MAX_VERTICES, PSTOP + 6))
     work = _room_for_ghosts(paths, light, iris, curvature_x, sides)
-    for p in range(paths.starts.size - 1):
-        found[p, 0] = found[p, 1] = 0.0
-        count, even = _place_ghost(paths, p, lens, curvature_x, light, iris, frame, work)
-        if count > 0:
-            count = cut_to_rectangle(work.polygon, count, other, values, width, height)
-        if count >= 3:
-            found[p, 0] = frame.gain * even * abs(polygon_area(work.polygon, count, PX, PY))
-            found[p, 1] = frame.gain * even
+    for m in range(near.size):
+        own = _lens_at(lens, m, near[m])
+        for p in range(paths.starts.size - 1):
+            found[p, m, 0] = found[p, m, 1] = 0.0
+            count, even = _place_ghost(paths, p, own, curvature_x, light, iris, frame, work, squares[m])
+            if count > 0:
+                count = cut_to_rectangle(work.polygon, count, other, values, width, height)
+            if count >= 3:
+                found[p, m, 0] = frame.gain * even * abs(polygon_area(work.polygon, count, PX, PY))
+                found[p, m, 1] = frame.gain * even
 
 
 class _Room(NamedTuple):
@@ -294,8 +281,8 @@ class _Room(NamedTuple):
         From `_rim`.
     spots, ring : ndarray
         From `_outline`.
-    squares : ndarray, shape (S,)
-        Squared sines at the steps of a path.
+    squares : ndarray, shape (steps,)
+        Squared sines at the steps of all paths.
     to_stop, across : ndarray, shape (MOST_CROSSINGS, 2, 2)
         Matrices to the crossings of the stop in the y and the x plane; one array if the planes do not differ.
     """
@@ -322,25 +309,29 @@ def _room_for_ghosts(paths, light, iris, curvature_x, sides):
 
 
 @inner
-def _lens_at(lens, w):
-    """Return a lens of several wavelengths at one of them."""
-    return MeridianLens(lens.curvature, lens.z_vertex, lens.n_gap[w], lens.reflectance[w], lens.sensor_z)
+def _lens_at(lens, m, w):
+    """Return a lens of several wavelengths with the indices of the m-th and the reflectances of the w-th."""
+    return MeridianLens(lens.curvature, lens.z_vertex, lens.n_gap[m], lens.reflectance[w], lens.sensor_z)
 
 
 @inner
-def _place_ghost(paths, p, lens, curvature_x, light, iris, frame, work):
-    """Fill a polygon with a ghost's outline in pixels; return its number of vertices and its flux per pixel."""
+def _place_ghost(paths, p, lens, curvature_x, light, iris, frame, work, squares):
+    """Fill a polygon with a ghost's outline in pixels; return its number of vertices and its flux per pixel.
+
+    `squares`, shape (steps,), is filled at the path's steps with the angles of its ray, also of a ghost that is dark.
+    """
     first, end = paths.starts[p], paths.starts[p + 1]
     rows, actions, crossings = paths.rows[first:end], paths.actions[first:end], paths.crossings[p]
     polygon, axes, to_pixels = work.polygon, frame.axes, frame.to_pixels
     whole = _meridians(rows, actions, lens, curvature_x, light.nearness, crossings, work.to_stop, work.across)
+    own = squares[first:end]
+    _fill_sines(rows, actions, lens, curvature_x, light, iris.radius, work.to_stop, work.across, own)
     close_ring(work.rim, work.spots, work.ring)
     head = _cut_by_iris(work, crossings, light, axes, iris.edges)
     if head < 0:
         return np.int64(0), 0.0
     count = _project_entrance(work, head, light, whole, crossings, axes)
-    _fill_sines(rows, actions, lens, curvature_x, light, iris.radius, work.to_stop, work.across, work.squares)
-    flux = paraxial_weight(rows, actions, lens.reflectance, work.squares) * abs(polygon_area(polygon, count, PP, PQ))
+    flux = paraxial_weight(rows, actions, lens.reflectance, own) * abs(polygon_area(polygon, count, PP, PQ))
     for k in range(count):
         x, y = polygon[k, PX], polygon[k, PY]
         polygon[k, PX] = to_pixels[0] - to_pixels[2] * (x * axes[0, 0] + y * axes[1, 0])
@@ -376,9 +367,16 @@ def _square(polygon, x, y):
 
 @inner
 def _centre(to_stop, slope, iris_radius, entrance):
-    """Return the height at the entrance of the ray that gives a ghost's colour."""
+    """Return the height at the entrance of the ray that gives a ghost's colour: the middle of what passes both rims.
+
+    A choice between the middles of the iris and of the entrance would jump where both are equally large, and the ray
+    could miss the light.
+    """
     ma, mb = to_stop[0, 0, 0], to_stop[0, 0, 1]
-    return -mb * slope / ma if iris_radius < entrance * abs(ma) else 0.0
+    if abs(ma) * entrance <= 1e-12 * iris_radius:
+        return 0.0
+    middle, reach = -mb * slope / ma, iris_radius / abs(ma)
+    return 0.5 * (max(middle - reach, -entrance) + min(middle + reach, entrance))
 
 
 @inner

@@ -29,6 +29,7 @@ __all__ = [
     "band_shares",
     "band_weights",
     "covers_all_lines",
+    "cubics",
     "hats",
     "luminance_shares",
     "planck",
@@ -257,7 +258,7 @@ def band_parts(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colors
     spectrum, wavelengths_nm, colorspace
         As in `band_weights`.
     curve_nm : array_like, shape (L,)
-        Points of the curve, ascending; it is linear between and constant beyond them.
+        Points of the curve, ascending; it is cubic between them (`cubics`) and constant beyond.
 
     Returns
     -------
@@ -272,7 +273,7 @@ def band_parts(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colors
     """
     wave, xyz = _stimulus(spectrum)
     rgb = xyz @ xyz_to_rgb_matrix(colorspace).T
-    parts: Floats = np.einsum("lw,nw,wc->lnc", hats(wave, curve_nm), hats(wave, wavelengths_nm), rgb, optimize=True)
+    parts: Floats = np.einsum("lw,nw,wc->lnc", cubics(wave, curve_nm), hats(wave, wavelengths_nm), rgb, optimize=True)
     return parts
 
 
@@ -329,6 +330,54 @@ def hats(wave: Floats, nodes_nm: ArrayLike) -> Floats:
     if nodes.ndim != 1 or nodes.size == 0 or bool(np.any(np.diff(nodes) <= 0.0)):
         raise ValueError("traced wavelengths must rise")
     return np.stack([np.interp(wave, nodes, row) for row in np.eye(nodes.size)])
+
+
+def cubics(wave: Floats, nodes_nm: ArrayLike) -> Floats:
+    """Evaluate piecewise cubic interpolation on ascending nodes, constant beyond the first and the last.
+
+    Parameters
+    ----------
+    wave : ndarray, shape (M,)
+        Points of evaluation.
+    nodes_nm : array_like, shape (N,)
+
+    Returns
+    -------
+    ndarray, shape (N, M)
+        Weights of the values at the nodes. They sum to 1 everywhere; each place has at most four.
+
+    Raises
+    ------
+    ValueError
+        When the nodes are not ascending.
+
+    Notes
+    -----
+    Lagrange's polynomial through the two nodes on either side (Abramowitz and Stegun 1964, 25.2.13); through the four
+    nearest in the first and the last gap. What two films reflect near their zero has a relative curvature of
+    12 / distance^2: 15 nm beside it a line between nodes 2.5 nm apart is 2.8 % too bright, which counts under a light
+    of few wavelengths.
+
+    Examples
+    --------
+    >>> cubics(np.array([1.5]), [0.0, 1.0, 2.0, 3.0])[:, 0].tolist()
+    [-0.0625, 0.5625, 0.5625, -0.0625]
+    """
+    nodes = np.atleast_1d(np.asarray(nodes_nm, dtype=np.float64))
+    if nodes.size < 4:
+        return hats(wave, nodes)
+    if nodes.ndim != 1 or bool(np.any(np.diff(nodes) <= 0.0)):
+        raise ValueError("the nodes must rise")
+    place = np.clip(wave, nodes[0], nodes[-1])
+    first = np.clip(np.searchsorted(nodes, place, "right") - 2, 0, nodes.size - 4)
+    weights = np.zeros((nodes.size, len(place)))
+    for j in range(4):
+        share = np.ones(len(place))
+        for k in range(4):
+            if k != j:
+                share *= (place - nodes[first + k]) / (nodes[first + j] - nodes[first + k])
+        weights[first + j, np.arange(len(place))] = share
+    return weights
 
 
 def band_contents(spectrum: Spectrum, wavelengths_nm: ArrayLike) -> tuple[tuple[Floats, Floats], ...]:

@@ -19,11 +19,11 @@ LEAST_PART = 1e-3
 # the error is estimated at every third wavelength
 EVERY = 3
 
-__all__ = ["bright_wavelengths", "interpolation_error", "throughput_ratios"]
+__all__ = ["bright_wavelengths", "gap_errors", "interpolation_error", "throughput_ratios"]
 
 
 def interpolation_error(
-    passed: Floats, light: Floats, known_nm: Floats, throughput: Floats, beyond: tuple[int, int] = (0, 0)
+    passed: Floats, light: Floats, known_nm: Floats, throughput: Floats, traced: Mask | None = None
 ) -> tuple[Floats, Floats]:
     """Estimate the colour error of a path from linear throughput between the traced wavelengths.
 
@@ -34,11 +34,11 @@ def interpolation_error(
     light : ndarray, shape (L, 3)
         The light in each channel.
     known_nm : ndarray, shape (W,)
-        The traced wavelengths and `beyond` others, ascending.
+        The traced wavelengths and others, ascending.
     throughput : ndarray, shape (..., W)
         At `known_nm`.
-    beyond : tuple of int
-        How many of `known_nm` lie below and above the traced ones.
+    traced : ndarray, shape (W,), bool, optional
+        Which of `known_nm` are traced; None: all.
 
     Returns
     -------
@@ -50,8 +50,10 @@ def interpolation_error(
     The reference is the cubic spline through the same values, with linear ends: its distance from the line is the
     leading term of the error.
     """
-    straight, bent = _interpolations(tuple(known_nm), beyond)
-    passed, light = passed[..., ::EVERY], light[::EVERY]
+    drawn = (True,) * len(known_nm) if traced is None else tuple(traced.tolist())
+    straight, bent = _interpolations(tuple(known_nm), drawn)
+    # all light, also of a line between two of these wavelengths
+    passed, light = passed[..., ::EVERY], _hats(tuple(CURVE_NM[::EVERY])) @ light
     # not `@`, whose library threads busy-wait next to ours
     line = np.einsum("...w,wl->...l", throughput, straight)
     more = np.maximum(np.einsum("...w,wl->...l", throughput, bent), 0.0) - line
@@ -59,8 +61,43 @@ def interpolation_error(
     return error, total
 
 
+def gap_errors(passed: Floats, light: Floats, known_nm: Floats, throughput: Floats) -> tuple[Floats, Floats]:
+    """Estimate how much each gap between known wavelengths adds to the colour error of `interpolation_error`.
+
+    Parameters
+    ----------
+    passed : ndarray, shape (L,) or (P, L)
+    light : ndarray, shape (L, 3)
+    known_nm : ndarray, shape (M,)
+        Ascending.
+    throughput : ndarray, shape (P, M)
+
+    Returns
+    -------
+    errors, shares : ndarray, shape (P, M - 1)
+        The error and the light of each gap, relative to the largest channel of the path; 0 and 1 if there is no light.
+        Light beyond the known wavelengths counts with the first and the last gap.
+    """
+    straight, bent = _interpolations(tuple(known_nm), (True,) * len(known_nm))
+    coarse_nm = CURVE_NM[::EVERY]
+    light = _hats(tuple(coarse_nm)) @ light
+    line = np.einsum("pw,wl->pl", throughput, straight)
+    more = np.maximum(np.einsum("pw,wl->pl", throughput, bent), 0.0) - line
+    gap = np.clip(np.searchsorted(known_nm, coarse_nm) - 1, 0, len(known_nm) - 2)
+    parts = (np.eye(len(known_nm) - 1)[gap][:, :, None] * light[:, None]).reshape(len(light), -1)
+    errors, shares = (
+        np.einsum("pl,lk->pk", one * passed[..., ::EVERY], parts).reshape(len(one), -1, 3) for one in (more, line)
+    )
+    total = np.abs(shares.sum(axis=1)).max(axis=1)[:, None]
+    errors, shares = np.abs(errors).max(axis=2), np.abs(shares).max(axis=2)
+    return (
+        np.divide(errors, total, out=np.zeros_like(errors), where=total > 0.0),
+        np.divide(shares, total, out=np.ones_like(shares), where=total > 0.0),
+    )
+
+
 @lru_cache(maxsize=64)
-def _interpolations(known_nm: tuple[float, ...], beyond: tuple[int, int]) -> tuple[Floats, Floats]:
+def _interpolations(known_nm: tuple[float, ...], traced: tuple[bool, ...]) -> tuple[Floats, Floats]:
     """Return the interpolation matrices from wavelengths to the curve, linear between traced ones and cubic, (W, L)."""
     nodes, curve_nm = np.array(known_nm), CURVE_NM[::EVERY]
     straight = hats(curve_nm, nodes)
@@ -83,13 +120,12 @@ def _interpolations(known_nm: tuple[float, ...], beyond: tuple[int, int]) -> tup
     # the ends continue with their slope
     low, high = slope[0] - gap[0] / 6.0 * second[1], slope[-1] + gap[-1] / 6.0 * second[-2]
     bent += np.minimum(curve_nm - nodes[0], 0.0)[:, None] * low + np.maximum(curve_nm - nodes[-1], 0.0)[:, None] * high
-    straight = np.pad(hats(curve_nm, nodes[beyond[0] : len(nodes) - beyond[1]]), (beyond, (0, 0)))
+    straight[:] = 0.0
+    straight[np.array(traced)] = hats(curve_nm, nodes[np.array(traced)])
     return straight, np.ascontiguousarray(bent.T)
 
 
-def throughput_ratios(
-    lit: Mask, traced_nm: Floats, throughput: Floats, fine_nm: Floats, fine: Floats
-) -> tuple[Floats, Floats]:
+def throughput_ratios(lit: Mask, traced_nm: Floats, throughput: Floats, fine: Floats) -> tuple[Floats, Floats]:
     """Split the throughput at all wavelengths over traced ones whose throughput is known only at themselves.
 
     Parameters
@@ -101,10 +137,8 @@ def throughput_ratios(
         Ascending.
     throughput : ndarray, shape (P, W)
         Of paths, at the traced wavelengths.
-    fine_nm : ndarray, shape (M,)
-        Ascending.
-    fine : ndarray, shape (P, M)
-        Throughput at `fine_nm`; linear between, constant beyond.
+    fine : ndarray, shape (P, L)
+        Throughput at `CURVE_NM`.
 
     Returns
     -------
@@ -116,7 +150,7 @@ def throughput_ratios(
     shares = np.zeros((len(traced_nm), len(CURVE_NM)))
     shares[lit] = _hats(tuple(traced_nm[lit]))
     known = np.einsum("pw,wl->pl", throughput, shares)
-    return shares, np.einsum("pm,ml->pl", fine, _hats(tuple(fine_nm))) / known
+    return shares, fine / known
 
 
 @lru_cache(maxsize=64)

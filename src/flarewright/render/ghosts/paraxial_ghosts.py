@@ -9,42 +9,45 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...kernels.paraxial.arguments import EntranceLight, MeridianLens, PathList, SensorFrame, StopOutline
-from ...kernels.paraxial.ghosts import RIM, draw_matrix_ghosts, matrix_squares, measure_matrix_ghosts
+from ...kernels.paraxial.ghosts import RIM, draw_matrix_ghosts, measure_matrix_ghosts
 from ...kernels.raster.edge_blur import spread_marks
 from ...kernels.raster.polygons import sum_rows
+from ...kernels.tracing.sequential import REFRACT
 from ...optics.colour.rgb import luminance_weights
 from ...optics.colour.spectrum import hats
 from ...optics.lens.paths import LightPath
-from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum, joined_steps, path_products, path_spectra
+from ...optics.rays.path_reflectance import CURVE_NM, BandCurves, PathSpectrum, joined_steps, products_between
 from ...typing import Floats, Indices
 from ..image.canvas import DETAIL_CONTRAST, DETAILS, Plane, merge
 from ..scene.art_rules import PathArt
-from ..scene.between_wavelengths import BEYOND, FINE_NM, NEAREST, STEEP
+from ..scene.between_wavelengths import STEEP
 from ..scene.paraxial_place import ghost_frame
 from ..scene.shot import Shot, at_fine_wavelengths
 from .art_filters import coarseness, filtered_ghost
 from .extent_blur import shape_kernel, spread_within
 from .steep_ghosts import (
+    ABRUPT_PART,
     DARK_PART,
     FAINT_PART,
-    abrupt_ends,
     bent_weights,
+    ends,
     light_up_to_its_end,
-    near_ends,
     over,
+    steep_gaps,
     steep_paths,
+    within_gaps,
 )
 
 # rounding error of sums of differences, relative to the largest value
 ROUNDING = 1e-12
-# a ray with less than this part of the light is totally reflected somewhere
-LEAST_CARRIED = 1e-13
+# squared sine above which transmittance changes fast with the angle; 1 is total reflection
+CRITICAL = 0.8
 # an offset larger than the distance of any ghost from the picture, pixels
 FAR_PX = 10**7
 # straight edges of the round entrance for comparing fluxes
@@ -63,7 +66,7 @@ def draw_draft(
     differences : ndarray, shape (H, W, 3), float64
         Added to; `kernels.raster.polygons.sum_rows` turns it into flux per pixel.
     colors : ndarray, shape (P, W, 3), optional
-        From `draft_colors`, possibly changed by art rules, with or without `FINE_NM`; None: computed.
+        From `draft_colors`, possibly changed by art rules, with or without `Between.fine_nm`; None: computed.
     first_row : int
         First row of the picture that `differences` holds, if it is a band.
     """
@@ -101,62 +104,89 @@ def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
     Returns
     -------
     ndarray, shape (P, W, 3)
-        If a path is dark at all traced wavelengths and not beyond them, the weights at `FINE_NM` follow: (P, W + M, 3).
+        If a path is dark at all traced wavelengths and not beyond them, the weights at `Between.fine_nm` follow:
+        (P, W + M, 3).
     """
     packed = shot.packed
     if not paths:
         return np.zeros((0, len(packed.wavelengths_nm), 3))
-    spectra, squares = _spectra(shot, paths)
-    plain = shot.weights(packed.wavelengths_nm, spectra)
-    colors = np.repeat(plain[None], len(paths), axis=0) if spectra is None else plain
+    flux, angles = matrix_fluxes(shot, paths, packed.n_gap, packed.reflectance)
     if shot.between is None:
-        return colors
-    flux = _fluxes(shot, paths, packed.n_gap, packed.reflectance)
+        return _plain_weights(shot, paths, _spectra(shot, paths, angles)[0])
+    between = shot.between
+    fine_nm, (fine, bands), near = between.fine_nm, between.finer, between.beyond(packed.wavelengths_nm)
+    beyond, more = matrix_fluxes(shot, paths, fine.n_gap[near], fine.reflectance, near)
+    angles = np.concatenate([angles, more])
+    spectra, squares = _spectra(shot, paths, angles, fine_nm[near], _transmitted(paths, angles))
+    colors = _plain_weights(shot, paths, spectra)
     throughput = flux if spectra is None else over(flux, spectra.carried)
-    beyond, carried = _fine_flux(shot, paths, squares, BEYOND)
-    known_nm, known = _merged((packed.wavelengths_nm, throughput), (FINE_NM[BEYOND], over(beyond, carried)))
-    starts = joined_steps(tuple(paths))[2]
-    for chosen, much in zip(steep_paths(shot, known_nm, known, spectra), (False, True), strict=True):
+    carried = _carried(bands, paths, squares, more, near)
+    known_nm, known = _merged((packed.wavelengths_nm, throughput), (fine_nm[near], over(beyond, carried)))
+    little, much_steep = steep_paths(shot, known_nm, known, spectra)
+    if between.lines_nm is not None:
+        little, much_steep = little[:0], np.union1d(little, much_steep)
+    for chosen, much in ((little, False), (much_steep, True)):
         if chosen.size == 0:
             continue
         few = [paths[int(k)] for k in chosen]
-        own = None if spectra is None else PathSpectrum(spectra.passed[chosen], spectra.carried[chosen])
-        angles = squares if spectra is None else np.concatenate([squares[starts[k] : starts[k + 1]] for k in chosen])
+        steps = _steps_of(paths, chosen)
+        waves = np.arange(len(fine_nm)) if much else np.array(STEEP)
+        # how much of a sliver lands in the picture depends on the polygon: take the one that is drawn
+        sides = RIM if much else ENTRANCE_SIDES
+        steep, more = matrix_fluxes(shot, few, fine.n_gap[waves], fine.reflectance, waves, sides)
+        steep = over(steep, _carried(bands, few, squares[steps], more, waves))
         if much:
-            # how much of a sliver lands in the picture depends on the polygon: take the one that is drawn
-            drawn = _fluxes(shot, few, packed.n_gap, packed.reflectance, RIM)
-            traced, fine = drawn if own is None else over(drawn, own.carried), _fine_throughput(shot, few, angles)
+            nodes_nm = fine_nm[np.concatenate([near, waves])]
+            own = _spectra(shot, few, np.concatenate([angles[:, steps], more]), nodes_nm, squares[steps])[0]
+            drawn = matrix_fluxes(shot, few, packed.n_gap, packed.reflectance, sides=RIM)[0]
+            traced = drawn if own is None else over(drawn, own.carried)
+            curve = _curve(shot, few, squares[steps], steep, own)
         else:
-            steep = FINE_NM[STEEP], over(*_fine_flux(shot, few, angles, STEEP))
-            traced, fine = throughput[chosen], _merged((known_nm, known[chosen]), steep)
-        colors[chosen] = bent_weights(shot, traced, own, *fine)
+            own = None if spectra is None else PathSpectrum(spectra.passed[chosen], spectra.carried[chosen])
+            nm, steep = _merged((known_nm, known[chosen]), (fine_nm[waves], steep))
+            traced, curve = throughput[chosen], steep @ hats(CURVE_NM, nm)
+        colors[chosen] = bent_weights(shot, traced, own, curve)
     # flux under total reflection is rounding error
     light = beyond.max(axis=1)
     hidden = np.flatnonzero((flux.max(axis=1) < DARK_PART * light) & (light > DARK_PART * FAINT_PART * flux.max()))
     return colors if hidden.size == 0 else _with_hidden(shot, paths, colors, flux, hidden)
 
 
+def _plain_weights(shot: Shot, paths: Sequence[LightPath], spectra: PathSpectrum | None) -> Floats:
+    """Return the weights of `draft_colors` of paths whose throughput is linear between the traced wavelengths."""
+    plain = shot.weights(shot.packed.wavelengths_nm, spectra)
+    return np.repeat(plain[None], len(paths), axis=0) if spectra is None else plain
+
+
 def _with_hidden(
     shot: Shot, paths: Sequence[LightPath], colors: Floats, flux: Floats, hidden: NDArray[np.intp]
 ) -> Floats:
-    """Add weights at `FINE_NM` for paths that are dark at all traced wavelengths, unless they are faint there too."""
+    """Add weights at fine wavelengths for paths that are dark at all traced ones, unless they are faint there too."""
     fine = at_fine_wavelengths(shot)
-    flux_there = _fluxes(fine, [paths[int(k)] for k in hidden], fine.packed.n_gap, fine.packed.reflectance, RIM)
+    fine_nm = fine.packed.wavelengths_nm
+    waves = np.arange(len(fine_nm))
+    own = [paths[int(k)] for k in hidden]
+    flux_there, angles = matrix_fluxes(fine, own, fine.packed.n_gap, fine.packed.reflectance, sides=RIM)
     light, beyond = (
         np.abs((of[:, :, None] * in_channels).sum(axis=1)).max(axis=1)
-        for of, in_channels in ((flux, colors), (flux_there, fine.weights(FINE_NM)))
+        for of, in_channels in ((flux, colors), (flux_there, fine.weights(fine_nm)))
     )
-    seen = beyond > FAINT_PART * light.max()
-    if not seen.any():
+    seen = np.flatnonzero(beyond > FAINT_PART * light.max())
+    if seen.size == 0:
         return colors
-    hidden, flux_there = hidden[seen], flux_there[seen]
-    few = [paths[int(k)] for k in hidden]
-    spectra, squares = _spectra(fine, few)
-    throughput = flux_there if spectra is None else over(flux_there, spectra.carried)
-    more, colors = np.zeros((len(paths), len(FINE_NM), 3)), colors.copy()
-    more[hidden] = bent_weights(fine, throughput, spectra, *_fine_throughput(shot, few, squares))
-    colors[hidden] = 0.0
+    few, angles = [own[int(k)] for k in seen], angles[:, _steps_of(own, seen)]
+    spectra, squares = _spectra(fine, few, angles)
+    throughput = over(flux_there[seen], _carried(fine.curves, few, squares, angles, waves))
+    more, colors = np.zeros((len(paths), len(fine_nm), 3)), colors.copy()
+    more[hidden[seen]] = bent_weights(fine, throughput, spectra, _curve(shot, few, squares, throughput, spectra))
+    colors[hidden[seen]] = 0.0
     return np.concatenate([colors, more], axis=1)
+
+
+def _steps_of(paths: Sequence[LightPath], chosen: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the steps of some paths among those of all concatenated ones."""
+    starts = joined_steps(tuple(paths))[2]
+    return np.concatenate([np.arange(starts[k], starts[k + 1]) for k in chosen])
 
 
 def _merged(one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
@@ -165,119 +195,168 @@ def _merged(one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> tuple[F
     return nm, np.concatenate([one[1], other[1]], axis=1)[:, order]
 
 
-def _fine_flux(
-    shot: Shot, paths: Sequence[LightPath], squares: Floats, waves: Sequence[int], sides: int = ENTRANCE_SIDES
-) -> tuple[Floats, Floats]:
-    """Compute the flux of paths at some of `FINE_NM`, and what rays carry there.
+def _carried(
+    bands: BandCurves | None, paths: Sequence[LightPath], squares: Floats, angles: Floats, near: Indices
+) -> Floats:
+    """Return what rays carry that have the mean reflectances of some wavelengths, shape (P, M).
 
     Parameters
     ----------
-    shot : Shot
+    bands : BandCurves or None
+        None: without films.
     paths : sequence of LightPath
-    squares : ndarray
-        Angles of their rays, as `path_products` takes them.
-    waves : sequence of int
-    sides : int
-        As in `_fluxes`.
-
-    Returns
-    -------
-    flux, carried : ndarray, shape (P, M)
+    squares : ndarray, shape (steps,)
+        From `_spectra`.
+    angles : ndarray, shape (M, steps)
+        From `matrix_fluxes`.
+    near : ndarray of int, shape (M,)
+        Wavelengths of `bands`.
     """
-    assert shot.between is not None
-    fine, bands = shot.between.finer
-    flux = _fluxes(shot, paths, fine.n_gap[waves], [fine.reflectance[w] for w in waves], sides)
-    return flux, np.ones_like(flux) if bands is None else path_products(bands.means[:, :, waves], paths, squares[None])
+    if bands is None:
+        return np.ones((len(paths), len(near)))
+    return products_between(bands.means[:, :, near], paths, squares, angles, np.eye(len(near)))
 
 
-def _fine_throughput(shot: Shot, paths: Sequence[LightPath], squares: Floats) -> tuple[Floats, Floats]:
-    """Compute the throughput of paths at `FINE_NM`, or at `CURVE_NM` where the light of a path ends.
+def _curve(
+    shot: Shot, paths: Sequence[LightPath], squares: Floats, throughput: Floats, spectra: PathSpectrum | None
+) -> Floats:
+    """Return the throughput of paths at `CURVE_NM`; where it is steep or ends, it is computed there.
 
     Parameters
     ----------
     shot : Shot
     paths : sequence of LightPath
-    squares : ndarray
-        As in `_fine_flux`.
-
-    Returns
-    -------
-    fine_nm : ndarray, shape (M,)
+    squares : ndarray, shape (steps,)
+        From `_spectra`.
     throughput : ndarray, shape (P, M)
+        At `Between.fine_nm`.
+    spectra : PathSpectrum or None
+        Of the paths.
+
+    Returns
+    -------
+    ndarray, shape (P, L)
     """
     assert shot.between is not None
-    fine, n_gap = shot.between.finer[0], shot.between.curve_indices
-    flux, carried = _fine_flux(shot, paths, squares, range(len(FINE_NM)), RIM)
-    throughput = over(flux, carried)
-    rises, falls = abrupt_ends(throughput)
-    ended = np.flatnonzero((rises | falls).any(axis=1))
-    if ended.size == 0:
-        return FINE_NM, throughput
+    between, (fine, bands) = shot.between, shot.between.finer
+    n_gap, nearest, curve = between.curve_indices, between.nearest, throughput @ between.spread
+    # between lines is no light
+    if between.lines_nm is not None:
+        return curve
 
-    # rays carry nearly the same as at the nearest fine wavelength
-    more = near_ends(FINE_NM, rises, falls)
-    near = NEAREST[more]
-    found = _fluxes(shot, [paths[int(k)] for k in ended], n_gap[more], [fine.reflectance[w] for w in near], RIM)
-    curve = throughput @ hats(CURVE_NM, FINE_NM)
-    curve[np.ix_(ended, more)] = over(found, carried[np.ix_(ended, near)])
-    # a curve's wavelengths lie too far apart to resolve an end
-    at_curve = curve.copy()
-    for gaps, bright, dark in zip(abrupt_ends(at_curve), (1, 0), (0, 1), strict=True):
-        for k, m in np.argwhere(gaps).tolist():
-            low, high = m + bright, m + dark
+    steep = steep_gaps(shot, between.fine_nm, throughput, spectra)
+    for k in np.flatnonzero(steep.any(axis=1)).tolist():
+        own, steps = [paths[k]], squares[_steps_of(paths, np.array([k]))]
 
-            def at(part: float, path: int = k, low: int = low, high: int = high) -> float:
-                indices, w = n_gap[low] + part * (n_gap[high] - n_gap[low]), int(NEAREST[low])
-                flux = _fluxes(shot, [paths[path]], indices[None], [fine.reflectance[w]], RIM)
-                return float(flux[0, 0] / carried[path, w])
+        more = within_gaps(between.fine_nm, steep[k])
+        flux, angles = matrix_fluxes(shot, own, n_gap[more], fine.reflectance, nearest[more], RIM)
+        curve[k, more] = over(flux, _carried(bands, own, steps, angles, nearest[more]))[0]
+        # a curve's wavelengths lie too far apart to resolve an end
+        at_curve = curve[[k]]
+        for gaps, bright, dark in zip(ends(at_curve, ABRUPT_PART), (1, 0), (0, 1), strict=True):
+            for m in np.flatnonzero(gaps[0]).tolist():
+                low, high = m + bright, m + dark
 
-            lit, unlit = light_up_to_its_end(at_curve[k, low], at)
-            # by linear interpolation each bound has half of its value
-            curve[k, low] += lit - 0.5 * at_curve[k, low]
-            curve[k, high] += unlit
-    return CURVE_NM, curve
+                at = partial(_flux_between, shot, own, n_gap[low], n_gap[high], nearest[[low]])
+                # relative to the bright bound, because rays carry nearly the same within a gap
+                bright_flux = at(0.0)
+                if not bright_flux > 0.0:
+                    continue
+                scale = at_curve[0, low] / bright_flux
+                lit, unlit = (scale * part for part in light_up_to_its_end(bright_flux, at))
+                # by linear interpolation each bound has half of its value
+                curve[k, low] += lit - 0.5 * at_curve[0, low]
+                curve[k, high] += unlit
+    return curve
 
 
-def _spectra(shot: Shot, paths: Sequence[LightPath]) -> tuple[PathSpectrum | None, Floats]:
-    """Compute what coatings pass along paths, and the angles of the rays used for it.
+def _flux_between(shot: Shot, path: list[LightPath], low: Floats, high: Floats, near: Indices, part: float) -> float:
+    """Compute the flux of one path where indices lie between two sets, with the mean reflectances of one wavelength."""
+    assert shot.between is not None
+    reflectance = shot.between.finer[0].reflectance
+    return float(matrix_fluxes(shot, path, (low + part * (high - low))[None], reflectance, near, RIM)[0][0, 0])
 
-    The angles are joined as `path_spectra` takes them.
+
+def _spectra(
+    shot: Shot, paths: Sequence[LightPath], angles: Floats, more_nm: Floats | None = None, squares: Floats | None = None
+) -> tuple[PathSpectrum | None, Floats]:
+    """Compute what coatings pass along one ray of each path.
+
+    Parameters
+    ----------
+    shot : Shot
+    paths : sequence of LightPath
+    angles : ndarray, shape (W + N, steps)
+        From `matrix_fluxes`, at the traced wavelengths and at others.
+    more_nm : ndarray, shape (N,), optional
+        These other wavelengths.
+    squares : ndarray, shape (steps,), optional
+        Result of an earlier call, for these paths; None: chosen.
+
+    Returns
+    -------
+    spectra : PathSpectrum or None
+        None without films.
+    squares : ndarray, shape (steps,)
+        Angles at which the light is transmitted: those of the middle wavelength, unless its ray is totally reflected.
     """
+    traced_nm = shot.packed.wavelengths_nm
+    if squares is None:
+        squares = _transmitted(paths, angles[: len(traced_nm)])
     if shot.curves is None:
-        return None, np.empty(0)
-    middle = len(shot.packed.n_gap) // 2
-    squares = _squares(shot, paths, middle)
-    spectra = path_spectra(shot.curves, paths, squares[None])
-    # a ray can be totally reflected at one wavelength but not at another
-    starts = joined_steps(tuple(paths))[2]
-    for w in sorted(range(len(shot.packed.n_gap)), key=lambda w: abs(w - middle))[1:]:
-        dark = np.flatnonzero(spectra.carried.max(axis=1) < LEAST_CARRIED)
-        if dark.size == 0:
-            break
-        few = [paths[int(k)] for k in dark]
-        other = _squares(shot, few, w)
-        squares[np.concatenate([np.arange(starts[k], starts[k + 1]) for k in dark])] = other
-        found = path_spectra(shot.curves, few, other[None])
-        spectra.passed[dark], spectra.carried[dark] = found.passed, found.carried
-    return spectra, squares
+        return None, squares
+    nodes_nm, order = np.unique(np.concatenate([traced_nm, [] if more_nm is None else more_nm]), return_index=True)
+    shares = _shares(tuple(nodes_nm), tuple(traced_nm))
+    through = products_between(shot.curves.reflectance, paths, squares, angles[order], shares)
+    return PathSpectrum(through[:, : len(CURVE_NM)], through[:, len(CURVE_NM) :]), squares
 
 
-def _squares(shot: Shot, paths: Sequence[LightPath], w: int) -> Floats:
-    """Compute the angles of one ray of each path at a traced wavelength."""
-    joined, (bent, light, _) = _joined_paths(tuple(paths)), _arguments(shot)
-    squares, radius = np.empty(len(joined.rows)), shot.opening.radius
-    matrix_squares(joined, _at_wavelength(bent, w), shot.packed.curvature_x, light, radius, squares)
+@lru_cache(maxsize=64)
+def _shares(nodes_nm: tuple[float, ...], traced_nm: tuple[float, ...]) -> Floats:
+    """Return the part that each node has in the columns of `BandCurves.reflectance`."""
+    return hats(np.concatenate([CURVE_NM, traced_nm]), nodes_nm)
+
+
+def _transmitted(paths: Sequence[LightPath], angles: Floats) -> Floats:
+    """Return the angles, (steps,), of the middle wavelength, or of the one whose ray is farthest from total reflection.
+
+    `angles` has shape (W, steps).
+    What passes at a fixed angle ends where total reflection begins at it, so this angle must be far from it. That rays
+    of other colours are closer to it is a part of their throughput.
+    """
+    squares: Floats = angles[len(angles) // 2].copy()
+    _, actions, starts = joined_steps(tuple(paths))
+    most = np.maximum.reduceat(np.where(actions == REFRACT, angles, 0.0), starts[:-1], axis=1)
+    least = most.argmin(axis=0)
+    for p in np.flatnonzero(most[len(angles) // 2] > CRITICAL).tolist():
+        squares[starts[p] : starts[p + 1]] = angles[least[p], starts[p] : starts[p + 1]]
     return squares
 
 
-def _fluxes(
-    shot: Shot, paths: Sequence[LightPath], n_gap: Floats, reflectance: Floats | list[Floats],
+def matrix_fluxes(
+    shot: Shot, paths: Sequence[LightPath], n_gap: Floats, reflectance: Floats, near: Indices | None = None,
     sides: int = ENTRANCE_SIDES,
-) -> Floats:  # fmt: skip
-    """Compute the flux of each ghost in the picture at some wavelengths, per unit irradiance, shape (P, M).
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Compute the flux of each ghost in the picture at some wavelengths, and the angles of one ray.
 
-    `n_gap` and `reflectance` are as in `PackedLens`, at these wavelengths; `sides` are the edges of the round entrance.
-    For an area light the flux counts everywhere, because its spread brings light from beside the picture into it.
+    Parameters
+    ----------
+    shot : Shot
+    paths : sequence of LightPath
+    n_gap : ndarray, shape (M, K + 1)
+    reflectance : ndarray, shape (W, K, S)
+    near : ndarray of int, shape (M,), optional
+        Which of the W belong to each of the M; None: they are the same.
+    sides : int
+        Edges of the round entrance.
+
+    Returns
+    -------
+    flux : ndarray, shape (P, M)
+        Per unit irradiance. For an area light it counts everywhere, because its spread brings light from beside the
+        picture into it.
+    angles : ndarray, shape (M, steps)
+        Squared sines on the side of the lower index.
     """
     bent, light, axes = _arguments(shot)
     joined, iris = _joined_paths(tuple(paths)), _outline(shot)
@@ -285,15 +364,13 @@ def _fluxes(
     if shot.border is not None:
         to_pixels = to_pixels + np.array([FAR_PX, FAR_PX, 0.0, 0.0])
         width, height = 2 * FAR_PX, 2 * FAR_PX
-    frame = SensorFrame(axes, to_pixels, 1.0)
-    found, seen = np.empty((len(paths), len(n_gap))), np.empty((len(paths), 2))
-    for m in range(len(n_gap)):
-        own = bent._replace(n_gap=n_gap[m], reflectance=reflectance[m])
-        measure_matrix_ghosts(
-            joined, own, shot.packed.curvature_x, light, iris, frame, float(width), float(height), sides, seen
-        )
-        found[:, m] = seen[:, 0]
-    return found
+    own = bent._replace(n_gap=n_gap, reflectance=reflectance)
+    found, angles = np.empty((len(paths), len(n_gap), 2)), np.empty((len(n_gap), len(joined.rows)))
+    measure_matrix_ghosts(
+        joined, own, np.arange(len(n_gap)) if near is None else near, shot.packed.curvature_x, light, iris,
+        SensorFrame(axes, to_pixels, 1.0), float(width), float(height), sides, found, angles,
+    )  # fmt: skip
+    return found[:, :, 0], angles
 
 
 def _arguments(shot: Shot) -> tuple[MeridianLens, EntranceLight, Floats]:
@@ -348,16 +425,16 @@ def weigh_drafts(shot: Shot, paths: Sequence[LightPath], colors: Floats) -> Floa
         Luminance of the light in the picture, and of one pixel of the ghost; 0 for a ghost that misses the picture.
     """
     bent, incoming, axes = _arguments(shot)
-    own = _at_wavelength(bent, len(bent.n_gap) // 2)
-    frame = SensorFrame(axes, shot.to_pixels, shot.gain)
+    middle = [len(bent.n_gap) // 2]
+    joined, frame = _joined_paths(tuple(paths)), SensorFrame(axes, shot.to_pixels, shot.gain)
     width, height = shot.size_px
-    seen = np.empty((len(paths), 2))
+    seen, angles = np.empty((len(paths), 1, 2)), np.empty((1, len(joined.rows)))
     measure_matrix_ghosts(
-        _joined_paths(tuple(paths)), own, shot.packed.curvature_x, incoming, _outline(shot), frame,
-        float(width), float(height), RIM, seen,
+        joined, bent._replace(n_gap=bent.n_gap[middle]), np.array(middle), shot.packed.curvature_x, incoming,
+        _outline(shot), frame, float(width), float(height), RIM, seen, angles,
     )  # fmt: skip
     light: Floats = colors.sum(axis=1) @ luminance_weights(shot.colorspace)
-    return seen * light[:, None]
+    return seen[:, 0] * light[:, None]
 
 
 def draft_details(shots: Sequence[Shot], paths: Sequence[LightPath], colors: Sequence[Floats]) -> Indices:

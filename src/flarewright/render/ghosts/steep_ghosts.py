@@ -24,16 +24,17 @@ from ...model.project.light import Spectrum
 from ...optics.colour.spectrum import band_parts
 from ...optics.rays.bundle import Bundle, trace_bundle
 from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum
-from ...optics.rays.steepness import bright_wavelengths, interpolation_error, throughput_ratios
+from ...optics.rays.steepness import bright_wavelengths, gap_errors, interpolation_error, throughput_ratios
 from ...typing import Floats, Mask
-from ..scene.between_wavelengths import FINE_NM
 from ..scene.path_color import visible_rays
 from ..scene.shot import Shot
 
 # lowest expected colour error for a correction, relative to the ghost's largest channel
 COLOR_ERROR, DRAFT_COLOR_ERROR = 0.009, 0.0077
 # above this error a few wavelengths do not suffice for the colour correction
-LARGE_ERROR = 0.05
+LARGE_ERROR = 0.02
+# above this error a gap between fine wavelengths is resolved
+GAP_ERROR = 0.003
 # a throughput below this part of the largest counts as zero, so the ghost ends within the spectrum
 DARK_PART = 1e-3
 # ghosts whose throughput changes less than this between ends and middle of the spectrum, relative, are not steep
@@ -50,15 +51,17 @@ BISECTIONS = 5
 ROUNDING = 1e-9
 
 __all__ = [
-    "abrupt_ends",
     "bent_spectrum",
     "bent_weights",
+    "ends",
+    "gaps_at_ends",
     "light_up_to_its_end",
-    "near_ends",
     "over",
     "seen_light",
+    "steep_gaps",
     "steep_paths",
     "steepness",
+    "within_gaps",
 ]
 
 
@@ -85,21 +88,22 @@ def steepness(
     if shot.between is None:
         return "not"
     traced_nm = shot.packed.wavelengths_nm
-    known_nm = np.concatenate([FINE_NM[:1], traced_nm, FINE_NM[-1:]])
-    fitted = 1 + np.array(sorted(bundle.traced))
+    known_nm = np.union1d(shot.between.fine_nm[[0, -1]], traced_nm)
+    drawn = np.isin(known_nm, traced_nm)
+    fitted = np.flatnonzero(drawn)[sorted(bundle.traced)]
     few = np.unique([0, *fitted, len(known_nm) - 1])
     throughput = np.empty(len(known_nm))
     throughput[few] = first = _areas_between(shot, bundle, known_nm[few], to_pixels)
     # without a traced wavelength that shows the ghost, extrapolation is too rough to draw it at 21
-    if not first[1:-1].any() or first.max() - first.min() <= LEAST_CHANGE * first.max():
+    if not first[drawn[few]].any() or first.max() - first.min() <= LEAST_CHANGE * first.max():
         return "not"
     others = np.setdiff1d(np.arange(len(known_nm)), few)
     throughput[others] = _areas_between(shot, bundle, known_nm[others], to_pixels)
     passed = np.ones(len(CURVE_NM)) if spectrum is None else spectrum.passed
-    error, total = interpolation_error(passed, seen_light(shot), known_nm, throughput, (1, 1))
+    error, total = interpolation_error(passed, seen_light(shot), known_nm, throughput, drawn)
     if not error > COLOR_ERROR * total:
         return "not"
-    throughput = throughput[1:-1]
+    throughput = throughput[drawn]
     return "much" if throughput.min() < SLIVER_PART * throughput.max() else "little"
 
 
@@ -129,12 +133,15 @@ def bent_spectrum(
         _areas(one, replace(bundle, traced=held), list(range(len(one.packed.wavelengths_nm))), to_pixels)
         for one, held in ((shot, {}), (fine, bundle.traced))
     )
-    traced_nm, fine_nm = shot.packed.wavelengths_nm, fine.packed.wavelengths_nm
+    assert shot.between is not None
+    traced_nm = shot.packed.wavelengths_nm
     if spectrum is None:
         spectrum = PathSpectrum(np.ones(len(CURVE_NM)), np.ones(len(traced_nm)))
     if not known.min() > 0.0:
         return spectrum
-    _, ratios = throughput_ratios(np.ones(len(traced_nm), dtype=np.bool_), traced_nm, known[None], fine_nm, found[None])
+    # not `@`, whose library threads busy-wait next to ours
+    curve = np.einsum("m,ml->l", found, shot.between.spread)[None]
+    _, ratios = throughput_ratios(np.ones(len(traced_nm), dtype=np.bool_), traced_nm, known[None], curve)
     return PathSpectrum(spectrum.passed * ratios[0], spectrum.carried)
 
 
@@ -186,9 +193,9 @@ def steep_paths(
     Parameters
     ----------
     shot : Shot
-    known_nm : ndarray, shape (W + 2,)
-        The traced wavelengths, one below and one above them.
-    throughput : ndarray, shape (P, W + 2)
+    known_nm : ndarray, shape (N,)
+        The traced wavelengths and `Between.beyond`, ascending.
+    throughput : ndarray, shape (P, N)
         Flux there over what rays carry.
     spectra : PathSpectrum or None
         Of all paths.
@@ -199,15 +206,16 @@ def steep_paths(
         Indices by the size of the error; paths much fainter than the brightest are left out.
     """
     passed = np.ones(len(CURVE_NM)) if spectra is None else spectra.passed
-    error, total = interpolation_error(passed, seen_light(shot), known_nm, throughput, (1, 1))
+    drawn = np.isin(known_nm, shot.packed.wavelengths_nm)
+    error, total = interpolation_error(passed, seen_light(shot), known_nm, throughput, drawn)
     seen = total > FAINT_PART * total.max(initial=0.0)
     # a ghost that is dark at one of these wavelengths ends within the spectrum
-    ends = throughput.min(axis=1) < DARK_PART * throughput.max(axis=1)
-    much = seen & (error > np.where(ends, DRAFT_COLOR_ERROR, LARGE_ERROR) * total)
+    ended = throughput.min(axis=1) < DARK_PART * throughput.max(axis=1)
+    much = seen & (error > np.where(ended, DRAFT_COLOR_ERROR, LARGE_ERROR) * total)
     return np.flatnonzero(seen & ~much & (error > DRAFT_COLOR_ERROR * total)), np.flatnonzero(much)
 
 
-def bent_weights(shot: Shot, throughput: Floats, spectra: PathSpectrum | None, fine_nm: Floats, fine: Floats) -> Floats:
+def bent_weights(shot: Shot, throughput: Floats, spectra: PathSpectrum | None, fine: Floats) -> Floats:
     """Return the RGB weights of the traced wavelengths for paths whose throughput is known at many.
 
     Parameters
@@ -217,10 +225,8 @@ def bent_weights(shot: Shot, throughput: Floats, spectra: PathSpectrum | None, f
         Their drawn flux at the traced wavelengths over what rays carry.
     spectra : PathSpectrum or None
         Of these paths.
-    fine_nm : ndarray, shape (M,)
-        Rising wavelengths.
-    fine : ndarray, shape (P, M)
-        Their throughput if these wavelengths were traced.
+    fine : ndarray, shape (P, L)
+        Their throughput if `CURVE_NM` were traced.
 
     Returns
     -------
@@ -232,7 +238,7 @@ def bent_weights(shot: Shot, throughput: Floats, spectra: PathSpectrum | None, f
     weights = np.zeros((*throughput.shape, 3))
     for which in np.unique(lit[lit.any(axis=1)], axis=0):
         alike = np.flatnonzero((lit == which).all(axis=1))
-        shares, passed = throughput_ratios(which, traced_nm, throughput[alike], fine_nm, fine[alike])
+        shares, passed = throughput_ratios(which, traced_nm, throughput[alike], fine[alike])
         if spectra is not None:
             passed = passed * spectra.passed[alike]
         parts = (shares[:, :, None] * light).transpose(1, 0, 2).reshape(len(light), -1)
@@ -240,13 +246,15 @@ def bent_weights(shot: Shot, throughput: Floats, spectra: PathSpectrum | None, f
     return weights if spectra is None else over(weights, spectra.carried[..., None])
 
 
-def abrupt_ends(throughput: Floats) -> tuple[Mask, Mask]:
-    """Find where the light of paths ends abruptly between two wavelengths, as under total reflection.
+def ends(throughput: Floats, least: float = DARK_PART) -> tuple[Mask, Mask]:
+    """Find where the light of paths ends between two wavelengths.
 
     Parameters
     ----------
     throughput : ndarray, shape (P, M)
         At rising wavelengths.
+    least : float
+        Least part of the largest throughput beside the dark; `ABRUPT_PART`: ends as under total reflection.
 
     Returns
     -------
@@ -254,28 +262,51 @@ def abrupt_ends(throughput: Floats) -> tuple[Mask, Mask]:
         The gaps in which light begins and ends.
     """
     most = throughput.max(axis=1, keepdims=True)
-    dark, bright = throughput < DARK_PART * most, throughput > ABRUPT_PART * most
+    dark, bright = throughput < DARK_PART * most, throughput > least * most
     return dark[:, :-1] & bright[:, 1:], bright[:, :-1] & dark[:, 1:]
 
 
-def near_ends(fine_nm: Floats, rises: Mask, falls: Mask) -> NDArray[np.intp]:
-    """Return which wavelengths of `CURVE_NM` lie in gaps where light ends, or next to them, where it changes fast.
+def gaps_at_ends(rises: Mask, falls: Mask) -> Mask:
+    """Return the gaps in which the light of paths ends, and the next, where it changes fast, shape (P, M - 1).
+
+    Parameters
+    ----------
+    rises, falls : ndarray, shape (P, M - 1), bool
+        From `ends`.
+    """
+    gaps = rises | falls
+    gaps[:, 1:] |= rises[:, :-1]
+    gaps[:, :-1] |= falls[:, 1:]
+    return gaps
+
+
+def steep_gaps(shot: Shot, fine_nm: Floats, throughput: Floats, spectra: PathSpectrum | None) -> Mask:
+    """Return the gaps in which a line between the fine wavelengths is not good enough, shape (P, M - 1).
+
+    Parameters
+    ----------
+    shot : Shot
+    fine_nm : ndarray, shape (M,)
+        Rising.
+    throughput : ndarray, shape (P, M)
+        At these.
+    spectra : PathSpectrum or None
+        Of the paths.
+    """
+    passed = np.ones(len(CURVE_NM)) if spectra is None else spectra.passed
+    errors, shares = gap_errors(passed, seen_light(shot), fine_nm, throughput)
+    gently, abruptly = (gaps_at_ends(*ends(throughput, least)) for least in (DARK_PART, ABRUPT_PART))
+    return abruptly | (gently & (shares > GAP_ERROR)) | (errors > GAP_ERROR)
+
+
+def within_gaps(fine_nm: Floats, gaps: Mask) -> NDArray[np.intp]:
+    """Return which of `CURVE_NM` lie within some gaps between rising wavelengths.
 
     Parameters
     ----------
     fine_nm : ndarray, shape (M,)
-        Rising.
-    rises, falls : ndarray, shape (P, M - 1), bool
-        From `abrupt_ends`.
-
-    Returns
-    -------
-    ndarray of int
-        Between `fine_nm`, of all paths.
+    gaps : ndarray, shape (M - 1,), bool
     """
-    gaps: Mask = np.any(rises | falls, axis=0)
-    gaps[1:] |= rises[:, :-1].any(axis=0)
-    gaps[:-1] |= falls[:, 1:].any(axis=0)
     within = (fine_nm[0] < CURVE_NM) & (fine_nm[-1] > CURVE_NM)
     inner = np.flatnonzero(within & ~np.isin(CURVE_NM, fine_nm))
     found: NDArray[np.intp] = inner[gaps[np.searchsorted(fine_nm, CURVE_NM[inner]) - 1]]

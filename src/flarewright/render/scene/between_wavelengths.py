@@ -8,12 +8,12 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from ...model import Coating, Lens
-from ...model.project.light import Spectrum
+from ...model.project.light import Lines, Spectrum
 from ...optics.colour.spectrum import hats
 from ...optics.lens.paraxial import FirstOrder
 from ...optics.rays.pack import PackedLens, SensorMirror, pack_lens
 from ...optics.rays.path_reflectance import CURVE_NM, BandCurves, CoatingCurves, band_curves
-from ...typing import Floats
+from ...typing import Floats, Indices
 
 # dense where films reflect most and glass disperses most
 FINE_NM = np.array([
@@ -24,8 +24,8 @@ FINE_NM = np.array([
 # half of the light below 450 nm lies below the first); and what steep ghosts need besides, where films' reflectance
 # changes most
 BEYOND, STEEP = [2, 19], [5, 17, 20]
-# of these, the nearest to each wavelength of a curve
-NEAREST = np.abs(FINE_NM - CURVE_NM[:, None]).argmin(axis=1)
+# of a light of few lines, how many beyond the traced wavelengths drafts compute at most; closer lines count as one
+MOST_BEYOND, CLOSE_NM = 5, 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +51,45 @@ class Between:
     curves: CoatingCurves | None
     spectrum: Spectrum
 
+    @cached_property
+    def lines_nm(self) -> Floats | None:
+        """The lines of a light that has no more of them than `FINE_NM`; None for any other light."""
+        if not isinstance(self.spectrum, Lines):
+            return None
+        nm = np.unique([wave for wave, power in self.spectrum.lines if power > 0.0])
+        return nm if len(nm) <= len(FINE_NM) else None
+
+    @cached_property
+    def fine_nm(self) -> Floats:
+        """Wavelengths that show how the throughput of a path changes: `FINE_NM`, or all that a few lines have."""
+        return FINE_NM if self.lines_nm is None else self.lines_nm
+
+    def beyond(self, traced_nm: Floats) -> Indices:
+        """Return which of them drafts compute for all ghosts besides those traced: towards the ends of the light."""
+        if self.lines_nm is None:
+            return np.array(BEYOND)
+        chosen: list[int] = []
+        known = traced_nm.tolist()
+        for k in np.flatnonzero((self.lines_nm < traced_nm[0]) | (self.lines_nm > traced_nm[-1])).tolist():
+            if np.abs(np.array(known) - self.lines_nm[k]).min() > CLOSE_NM and len(chosen) < MOST_BEYOND:
+                chosen.append(k)
+                known.append(float(self.lines_nm[k]))
+        return np.array(chosen, dtype=np.intp)
+
+    @cached_property
+    def nearest(self) -> Indices:
+        """The nearest of them to each of `CURVE_NM`."""
+        nearest: Indices = np.abs(self.fine_nm - CURVE_NM[:, None]).argmin(axis=1)
+        return nearest
+
+    @cached_property
+    def spread(self) -> Floats:
+        """Matrix from values at `fine_nm` to `CURVE_NM`, shape (M, L): linear, or those of the nearest line."""
+        if self.lines_nm is None:
+            return hats(CURVE_NM, FINE_NM)
+        # the light of a line is spread over the four nearest wavelengths of the curve
+        return np.eye(len(self.lines_nm))[:, self.nearest]
+
     def packed_at(self, wavelengths_nm: Floats) -> tuple[PackedLens, BandCurves | None]:
         """Pack the lens at some wavelengths, with the means over their bands."""
         bands = None if self.curves is None else band_curves(self.curves, self.spectrum, tuple(wavelengths_nm.tolist()))
@@ -62,13 +101,13 @@ class Between:
 
     @cached_property
     def finer(self) -> tuple[PackedLens, BandCurves | None]:
-        """The lens at `FINE_NM`, and the bands of these wavelengths."""
-        return self.packed_at(FINE_NM)
+        """The lens at `fine_nm`, and the bands of these wavelengths."""
+        return self.packed_at(self.fine_nm)
 
     @cached_property
     def curve_indices(self) -> Floats:
         """Indices of the gaps at `CURVE_NM`, shape (L, K + 1): almost linear in 1 / wavelength^2."""
-        return hats(-(CURVE_NM**-2.0), -(FINE_NM**-2.0)).T @ self.finer[0].n_gap
+        return hats(-(CURVE_NM**-2.0), -(self.fine_nm**-2.0)).T @ self.finer[0].n_gap
 
 
 # all frames of a sequence share one

@@ -14,7 +14,7 @@ from ...optics.pupil.polygon import closed
 from ...optics.rays.bundle import Incidence, incidence, least_distance
 from ...optics.rays.pack import PackedLens, facing, resolve_coatings
 from ...optics.rays.path_reflectance import BandCurves, coating_curves
-from .between_wavelengths import FINE_NM, Between, lens_between
+from .between_wavelengths import Between, lens_between
 from .holdout import read_plates, seen_part
 from .opening import Opening
 from .resolve import ResolvedProject
@@ -49,13 +49,14 @@ def make_shots(settled: ResolvedProject, opening: Opening, *, sampled: bool = Fa
     for number, light in enumerate(project.lights):
         wavelengths_nm = choose(quality.wavelengths, light.spectrum)
         # line spectra are traced at their lines
-        banded = curves is not None and not covers_all_lines(light.spectrum, wavelengths_nm)
+        whole_light = covers_all_lines(light.spectrum, wavelengths_nm)
+        banded = curves is not None and not whole_light
         traced = tuple(wavelengths_nm.tolist())
         key = (traced, light.spectrum)
         if key not in packs:
             of_bands = curves if banded else None
             between = lens_between(settled.lens, settled.order, coatings, settled.sensor, of_bands, light.spectrum)
-            steep = bridged and not covers_all_lines(light.spectrum, wavelengths_nm) and 1 < len(traced) < len(FINE_NM)
+            steep = bridged and not whole_light and 1 < len(traced) < len(between.fine_nm)
             packs[key] = *between.packed_at(wavelengths_nm), between if steep else None
         of_light, bands, between_them = packs[key]
         whole = []
