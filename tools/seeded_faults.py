@@ -258,9 +258,10 @@ def run(options: argparse.Namespace) -> int:
 
     with tempfile.TemporaryDirectory(prefix="seeded-faults-") as folder:
         copies = [Copy(options.checkout, Path(folder) / str(number)) for number in range(options.jobs)]
-        broken = copies[0].failing([], [], SUITE_TIMEOUT_S)
-        if broken:
-            print(f"ignored, because they fail without any fault: {', '.join(broken)}", flush=True)
+        broken = options.ignored
+        if broken is None:
+            broken = copies[0].failing([], [], SUITE_TIMEOUT_S)
+            print(f"ignored, because they fail without any fault: {' '.join(broken) or 'none'}", flush=True)
         for copy in copies:
             copy.broken = broken
         by_named_tests([fault for fault in faults if fault.id not in verdicts], copies, keep)
@@ -315,6 +316,12 @@ def main() -> int:
     one.add_argument("--only", nargs="+", metavar="ID", help="run only these faults")
     one.add_argument("--jobs", type=int, default=2, help="number of faults at the same time (default: 2)")
     one.add_argument("--named-only", action="store_true", help="run only the tests that a fault names")
+    one.add_argument(
+        "--ignored",
+        nargs="*",
+        metavar="TEST",
+        help="leave out these tests, without a first run of the suite that finds them",
+    )
     one.add_argument("--resume", action="store_true", help="keep the verdicts of the results file")
     one.set_defaults(work=run)
     one = commands.add_parser("table", help="print results as a table, several in columns")

@@ -7,7 +7,7 @@ import pytest
 from planted_run import SIZE, shape, views
 
 from flarewright.measure.fitting.detected_ghost import DetectedGhost
-from flarewright.measure.glow.rejection import is_residual_glow
+from flarewright.measure.glow.rejection import is_residual_glow, with_glow_unwanted
 from flarewright.measure.glow.subtraction import AROUND_LIGHT
 
 # distance of the light from the axis at field 1, pixels
@@ -67,3 +67,14 @@ def test_only_the_views_of_a_ghost_decide():
 def test_a_ghost_without_measured_pixels_is_rejected():
     dark = [replace(view, variance=np.full_like(view.variance, np.inf)) for view in views_with_glow(1.0)]
     assert is_residual_glow([found(-WAY, 20.0, 1.0)], dark) == [True]
+
+
+def test_ghosts_detected_at_the_light_are_unwanted():
+    at_light, bright, away, faint = (
+        found(*each) for each in ((WAY, 40.0, 0.05), (WAY, 40.0, 0.3), (-WAY, 40.0, 0.05), (-WAY, 20.0, 0.002))
+    )
+    detected = [at_light, bright, away, faint, replace(away, unwanted=True)]
+    marked = with_glow_unwanted(detected, views_with_glow(1.0, bright.shapes[:1]))
+    assert all(now.shapes is before.shapes for now, before in zip(marked, detected, strict=True))
+    # a faint one away from the light is judged after its fit
+    assert [ghost.unwanted for ghost in marked] == [True, False, False, False, True]

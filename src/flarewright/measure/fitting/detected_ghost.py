@@ -34,7 +34,7 @@ class DetectedGhost:
     fits : tuple of Fit or None
         Fit of each colour; None before the first fit.
     unwanted : bool
-        The user rejected it: the fit keeps it to explain its light, but the model omits it.
+        Rejected by the user or as residual glow: the fit keeps it to explain its light, but the model omits it.
     """
 
     shapes: tuple[Shape, Shape, Shape]

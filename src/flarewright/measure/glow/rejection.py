@@ -8,6 +8,8 @@ never leaves the light from the halo, or light below 0.5 % of the glow from an e
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from math import isfinite
 
 import numpy as np
 
@@ -42,6 +44,32 @@ def is_residual_glow(
     """
     noise, masks = channel_noise(views), masks_of(views)
     return [_is_glow(ghost, leading(ghost, noise), views, masks, settings) for ghost in ghosts]
+
+
+def with_glow_unwanted(
+    detected: Sequence[DetectedGhost], views: Sequence[View], settings: RejectionSettings = RejectionSettings()
+) -> list[DetectedGhost]:
+    """Mark ghosts detected at the light, faint or hidden, as unwanted before they are fitted together.
+
+    Where two of them describe the same residual glow, a joint fit determines only their sum: one can drift away from
+    the light, where `is_residual_glow` takes it for a ghost. So a ghost at the light is judged where it is detected.
+
+    Parameters
+    ----------
+    detected : sequence of DetectedGhost
+    views : sequence of View
+        As photographed, in the same pixels.
+    settings : RejectionSettings
+        A limit without a largest offset waits for the fit, which knows the brightness better.
+
+    Returns
+    -------
+    list of DetectedGhost
+        The fit keeps the unwanted ones, the model omits them.
+    """
+    near = replace(settings, limits=tuple(limit for limit in settings.limits if isfinite(limit[0])))
+    glow = is_residual_glow(detected, views, near)
+    return [replace(ghost, unwanted=ghost.unwanted or left) for ghost, left in zip(detected, glow, strict=True)]
 
 
 def _is_glow(

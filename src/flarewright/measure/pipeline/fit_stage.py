@@ -28,7 +28,7 @@ from ..detection.split_ghosts import split_ghosts
 from ..fitting.alternating_fit import fit_all, to_model
 from ..fitting.detected_ghost import CHANNELS, DetectedGhost, by_brightness, residual_of
 from ..glow.fit import iris_of
-from ..glow.rejection import is_residual_glow
+from ..glow.rejection import is_residual_glow, with_glow_unwanted
 from ..glow.subtraction import fit_and_subtract_glow
 from ..residual.learn import with_residual
 from .search_images import mixed_for_search, model_of_run, scaled_ghost, search_views, star_of
@@ -94,9 +94,10 @@ def fit_ghosts(
         for _ in range(again):
             # with more ghosts known the glow is estimated better, and fainter ghosts can be detected
             dim = fit_and_subtract_glow(settled, views, dim.star, pool, settings.glow)
-            settled += _search_residual(
+            more = _search_residual(
                 settled, views, dim.views, most - len(settled), iris, pool, tell, next(parts), journal, settings
             )
+            settled += with_glow_unwanted(more, views, settings.glow.rejection)
             settled = _rejoined(settled, dim.views, pool, tell, settings.detection)
             settled = split_ghosts(
                 settled, dim.views, iris=iris, pool=pool, tell=tell, journal=journal, settings=settings.detection
