@@ -285,6 +285,17 @@ def test_what_stops_a_render_is_one_sentence_and_leaves_nothing(capsys, monkeypa
     assert list(folder.iterdir()) == []
 
 
+def test_an_unexpected_end_of_a_file_is_no_interruption(monkeypatch):
+    """Typer turns an EOFError of any call into the end of a Ctrl-C."""
+
+    def stop(*args, **kwargs):
+        raise EOFError("a library met the end of a file")
+
+    monkeypatch.setattr("flarewright.render.render.render", stop)
+    with pytest.raises(EOFError, match="a library met"):
+        run(["render", "heliar-tronnier", "--light", "1,1", "-o", "a.exr"])
+
+
 @pytest.mark.parametrize(
     ("words", "goes_on"),
     [

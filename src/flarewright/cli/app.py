@@ -222,7 +222,12 @@ def _call(words: list[str]) -> int:
             code: Any = app(args=words, prog_name="flarewright", standalone_mode=False)
     except FlarewrightError as error:
         return _fail(str(error), getattr(error, "problems", ()))
-    except (KeyboardInterrupt, typer.Abort):
+    except KeyboardInterrupt:
+        code = 130
+    except typer.Abort as error:
+        # Typer turns an EOFError of any call into this; no command asks questions, so it is a bug
+        if isinstance(error.__cause__, EOFError):
+            raise error.__cause__ from None
         code = 130
     except MemoryError:
         return _fail(f"there is not enough memory for this; {_memory_advice(words)}")
