@@ -11,7 +11,7 @@ import sys
 import time
 from collections.abc import Callable
 
-from .kinds import KINDS
+from .kinds import KINDS, SLOW
 from .worker import Tried, Worker
 
 
@@ -70,7 +70,8 @@ def main() -> int:
     unknown = set(given.kinds) - set(KINDS)
     if unknown:
         parser.error(f"no kind {', '.join(sorted(unknown))}; choose from {', '.join(KINDS)}")
-    done = rig(given.kinds or list(KINDS), given.minutes, given.seed, lambda line: print(line, flush=True))
+    default = [kind for kind in KINDS if given.minutes >= SLOW.get(kind, 0.0)]
+    done = rig(given.kinds or default, given.minutes, given.seed, lambda line: print(line, flush=True))
     print(table(done))
     return 1 if any(not tried.verdict.held for _, tried in done) else 0
 
