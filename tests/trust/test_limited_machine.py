@@ -9,7 +9,7 @@ from .limited_machine import disk, memory
 
 def test_a_full_disk_gets_a_sentence_and_no_file():
     verdicts = list(map(disk, range(6)))
-    assert all(verdict.held for verdict in verdicts), verdicts
+    assert [verdict for verdict in verdicts if not verdict.held] == []
     if not verdicts[0].remark.startswith("skipped"):
         assert any("no space left on device" in verdict.remark.lower() for verdict in verdicts)
 
@@ -17,5 +17,5 @@ def test_a_full_disk_gets_a_sentence_and_no_file():
 @pytest.mark.slow
 def test_little_memory_gets_a_sentence_and_no_file():
     verdicts = list(map(memory, range(8)))
-    assert all(verdict.held for verdict in verdicts), verdicts
+    assert [verdict for verdict in verdicts if not verdict.held] == []
     assert any("not enough memory" in verdict.remark or "needs" in verdict.remark for verdict in verdicts)
