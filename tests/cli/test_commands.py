@@ -266,6 +266,8 @@ def test_turning_the_blades_keeps_the_lens_own_number(capsys, projects):
     [
         (KeyboardInterrupt(), 130, "flarewright: interrupted; nothing was left half-written"),
         (MemoryError(), 2, "flarewright: error: there is not enough memory"),
+        (ImportError("x.so: failed to map segment from shared object"), 2, "flarewright: error: there is not enough m"),
+        (RuntimeError("can't start new thread"), 2, "flarewright: error: there is not enough memory"),
         (OSError(28, "No space left on device"), 2, "flarewright: error: No space left on device"),
     ],
 )
