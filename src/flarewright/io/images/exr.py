@@ -20,7 +20,9 @@ writes every layer at the size of the picture.
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import frexp, inf
@@ -54,6 +56,8 @@ _PREFIX = "flarewright."
 _SCALE = f"{_PREFIX}scale"
 _CHANNELS = "RGB"
 
+# with less space left on the disk than this, bytes, a written file is read again
+_SPARE = 1_000_000
 # the library prints errors to stdout; redirecting stdout affects all threads
 _REDIRECT_LOCK = Lock()
 
@@ -190,6 +194,12 @@ def _write_parts(parts: list[Any], temporary: Path, path: str | PathLike[str]) -
         message = str(error).rstrip(".")
         reason = message.partition(f'"{temporary}". ')[2]
         raise OSError(reason or message.replace(str(temporary), str(path))) from error
+    if shutil.disk_usage(temporary.parent).free < _SPARE:
+        # the library ignores errors of the last bytes, which it writes when it closes a file
+        try:
+            _open_parts(temporary, "an EXR file")
+        except FileError:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from None
 
 
 def read_exr(path: str | PathLike[str]) -> ExrContents:
