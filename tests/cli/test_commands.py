@@ -267,6 +267,8 @@ def test_turning_the_blades_keeps_the_lens_own_number(capsys, projects):
     [
         (KeyboardInterrupt(), 130, "flarewright: interrupted; nothing was left half-written"),
         (MemoryError(), 2, "flarewright: error: there is not enough memory"),
+        (ImportError("x.so: failed to map segment from shared object"), 2, "flarewright: error: there is not enough m"),
+        (RuntimeError("can't start new thread"), 2, "flarewright: error: there is not enough memory"),
         (OSError(28, "No space left on device"), 2, "flarewright: error: No space left on device"),
     ],
 )
@@ -284,6 +286,17 @@ def test_what_stops_a_render_is_one_sentence_and_leaves_nothing(capsys, monkeypa
         assert len(said.err.splitlines()) == 1
         assert said.err.startswith(words)
     assert list(folder.iterdir()) == []
+
+
+def test_an_unexpected_end_of_a_file_is_no_interruption(monkeypatch):
+    """Typer turns an EOFError of any call into the end of a Ctrl-C."""
+
+    def stop(*args, **kwargs):
+        raise EOFError("a library met the end of a file")
+
+    monkeypatch.setattr("flarewright.render.render.render", stop)
+    with pytest.raises(EOFError, match="a library met"):
+        run(["render", "heliar-tronnier", "--light", "1,1", "-o", "a.exr"])
 
 
 @pytest.mark.parametrize(

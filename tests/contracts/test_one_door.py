@@ -16,10 +16,8 @@ OPENERS = {
 # no file of a user (what is written, the package's data, devices of the system, bytes in memory), or the door's file
 ALLOWED = {
     ("cli/app.py", "os.open"),
-    ("cli/gallery.py", "path.read_bytes"),
     ("cli/looks.py", "Image.open"),
     ("editor/server/app.py", ".open"),
-    ("editor/server/tokens.py", ".open"),
     ("editor/server/tokens.py", "os.open"),
     ("editor/server/tokens.py", "path.read_text"),
     ("editor/session/autosave_lock.py", ".open"),
@@ -33,7 +31,6 @@ ALLOWED = {
     ("kernels/jit/cache_files.py", ".read_bytes"),
     ("kernels/jit/roots.py", ".read_text"),
     ("measure/core/checkpoint.py", "path.open"),
-    ("measure/pipeline/merge_stage.py", "path.open"),
     ("render/scene/memory_check.py", "MEMINFO.read_text"),
 }
 

@@ -308,8 +308,10 @@ def test_a_token_is_random_and_kept_for_the_account(tmp_path, monkeypatch):
         (tmp_path / "token").write_bytes(bad)
         with pytest.raises(ProjectError, match="--token-file"):
             token_of(tmp_path / "token")
-    with pytest.raises(ProjectError, match="cannot be read"):
+    with pytest.raises(ProjectError, match=r"--token-file: .*none does not exist: check the path"):
         token_of(tmp_path / "none")
+    with pytest.raises(ProjectError, match=r"--token-file: .* is a folder"):
+        token_of(tmp_path)
 
 
 def test_a_token_is_no_option(tmp_path, capsys):
@@ -317,7 +319,7 @@ def test_a_token_is_no_option(tmp_path, capsys):
     for words, said in (
         (["--token", "a-secret-token"], "--token"),
         (["--token-file", str(tmp_path / "short")], "too short"),
-        (["--token-file", str(tmp_path / "none")], "cannot be read"),
+        (["--token-file", str(tmp_path / "none")], "does not exist"),
         (["--base-url", "ftp://x"], "is no address"),
     ):
         assert run(["edit", "--no-browser", *words]) == 2

@@ -3,10 +3,13 @@
 import http.client
 import http.server
 import json
+import os
 import re
+import shutil
 import signal
 import socket
 import socketserver
+import subprocess
 import threading
 import time
 import urllib.request
@@ -19,7 +22,9 @@ import pytest
 pytest.importorskip("playwright", reason="the extra e2e is not installed")
 pytest.importorskip("starlette", reason="the extra ui is not installed")
 
-from chromium import Editor, Tab, chromium
+from chromium import Editor, Tab, chromium, drop
+
+from flarewright.editor.preview.display_image import png
 
 pytestmark = [
     pytest.mark.browser,
@@ -143,15 +148,46 @@ def pump(source, target):
         target.shutdown(socket.SHUT_WR)
 
 
+@contextmanager
+def nginx_to(port, prefix, folder):
+    """Run nginx with the lines of docs/editor.md."""
+    program = shutil.which("nginx", path=f"{os.environ['PATH']}:/usr/sbin")
+    if program is None:
+        pytest.skip("no nginx was found; on Debian: apt-get install nginx-light")
+    page = (Path(__file__).parents[2] / "docs" / "editor.md").read_text("utf-8")
+    lines = re.search(r"```\n(location .*?\n\})\n```", page, re.DOTALL)[1]
+    lines = lines.replace("location /flare/", f"location {prefix}/").replace("127.0.0.1:8640", f"127.0.0.1:{port}")
+    front, kinds = free_port(), ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+    paths = " ".join(f"{kind}_temp_path {folder}/{kind};" for kind in kinds)
+    # workers of root's nginx belong to another account, which may not write the temporary files of bodies
+    user = "user root; " if os.geteuid() == 0 else ""
+    (folder / "nginx.conf").write_text(
+        f"{user}daemon off; pid {folder}/nginx.pid; error_log {folder}/errors; events {{}}\n"
+        f"http {{ access_log off; {paths} server {{ listen 127.0.0.1:{front};\n{lines}\n}} }}\n"
+    )
+    process = subprocess.Popen([program, "-c", str(folder / "nginx.conf"), "-e", str(folder / "errors")])
+    try:
+        until = time.monotonic() + 20.0
+        while time.monotonic() < until:
+            with suppress(OSError), socket.create_connection(("127.0.0.1", front)):
+                break
+            time.sleep(0.05)
+        yield front
+    finally:
+        process.terminate()
+        process.wait(10.0)
+
+
 # as jupyter-server-proxy and nginx do: the prefix is cut off, kept, or cut off and the host replaced
-@pytest.mark.parametrize("flavour", ["cut", "kept", "renamed"])
+@pytest.mark.parametrize("flavour", ["cut", "kept", "renamed", "nginx"])
 def test_the_editor_works_behind_a_proxy_with_a_path(chrome, tmp_path, flavour):
     port = free_port()
     prefix = f"/user/me/proxy/{port}"
     handler = proxy_to(port, prefix, keeps_prefix=flavour == "kept", own_host=flavour == "renamed")
-    with served(handler) as front:
+    with nginx_to(port, prefix, tmp_path) if flavour == "nginx" else served(handler) as front:
         base = f"http://127.0.0.1:{front}{prefix}/"
-        editor = Editor(tmp_path / "state", "--base-url", f"{prefix}/" if flavour != "renamed" else base, port=port)
+        given = base if flavour in ("renamed", "nginx") else f"{prefix}/"
+        editor = Editor(tmp_path / "state", "--base-url", given, port=port)
         try:
             editor.address = f"{base}?{editor.address.partition('?')[2]}"
             context = chrome.new_context(viewport={"width": 1280, "height": 720})
@@ -166,6 +202,9 @@ def test_the_editor_works_behind_a_proxy_with_a_path(chrome, tmp_path, flavour):
             tab.rest()
             tab.tab("library")
             tab.until("document.querySelector('.library img')?.naturalWidth > 0")
+            # larger than a proxy lets through by default
+            drop(tab, "sky.png", png(np.random.default_rng(1).integers(0, 256, (800, 800, 3), dtype=np.uint8)))
+            tab.until("flarewright.state.view.plate")
             assert tab.said == []
             assert all(url.startswith((base, "blob:", "data:")) for url in tab.asked)
             # the cookie is not sent to other users of the proxy

@@ -74,6 +74,19 @@ def test_the_page_reads_and_writes_under_the_folders_only(session, tmp_path):
         session.open("~nosuchuser/x.toml")
 
 
+def test_a_misspelt_lens_is_reported_as_one(session, tmp_path, monkeypatch):
+    """Also where the folder of the program is outside: then whether a file of the name exists is not reported."""
+    monkeypatch.chdir(tmp_path)
+    sentence = r"'takumar-50-f1.5' is outside|'takumer' is neither a shipped lens \(did you mean takumar-50-f1.4"
+    for text in ("takumer", "takumer"):
+        for asked in (lambda: session.open(text), lambda: session.do("choose_lens", {"lens": text})):  # noqa: B023
+            with pytest.raises(ProjectError, match=sentence):
+                asked()
+        (tmp_path / "takumer").write_text("")
+    with pytest.raises(ProjectError, match=OUTSIDE):
+        session.open("takumer.toml")
+
+
 def test_a_project_may_not_lead_out_of_the_folders(session, tmp_path):
     inside, outside = tmp_path / "in", tmp_path / "out"
     (outside / "secret.png").write_bytes(png(np.full((8, 8, 3), 128, dtype=np.uint8)))

@@ -1,11 +1,13 @@
 """The editor's server, by its requests, without a browser."""
 
 import json
+import struct
 import threading
 import time
 import urllib.error
 import urllib.request
 from pathlib import Path
+from socket import SO_LINGER, SOL_SOCKET
 
 import pytest
 
@@ -184,6 +186,26 @@ def test_a_drag_is_followed_through_a_socket(workspace):
         connect(address, origin="http://evil.example", additional_headers=workspace.cookie),
     ):
         pass
+
+
+def test_a_client_that_floods_and_leaves_is_not_written_to(workspace, caplog):
+    """Writing to a lost connection makes asyncio print a warning for each message."""
+    from websockets.sync.client import connect
+
+    address = workspace.address.replace("http", "ws") + "/ws/moving"
+    moved = json.dumps({"number": 1, "light": 0, "x": "3", "y": "1", "revision": workspace.session.revision})
+    for _ in range(3):
+        socket = connect(address, additional_headers=workspace.cookie).__enter__()
+        for _ in range(1000):
+            socket.send(moved)
+        # no closing handshake: a page that vanishes
+        socket.socket.setsockopt(SOL_SOCKET, SO_LINGER, struct.pack("ii", 1, 0))
+        socket.socket.close()
+    end = time.monotonic() + 60.0
+    while workspace.following and time.monotonic() < end:
+        time.sleep(0.02)
+    assert workspace.following == 0
+    assert "socket.send() raised exception" not in caplog.text
 
 
 def test_a_lost_connection_ends_the_drag(workspace):

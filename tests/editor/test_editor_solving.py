@@ -12,7 +12,9 @@ from PIL import Image
 
 from flarewright.design.coatings.color_search import solve_colors
 from flarewright.design.coatings.colors import color_problem, own_colors, perceived_differences
+from flarewright.design.solvers.pool_search import PoolState, solve
 from flarewright.editor.design import search_job
+from flarewright.editor.design.kept_search import kept_search, read_kept
 from flarewright.editor.design.search_job import DisplaySettings, Solver
 from flarewright.editor.preview import draft_match, render_picture
 from flarewright.editor.preview.display_image import pixels_of
@@ -84,6 +86,59 @@ def test_a_search_that_gets_ready_is_stopped_at_once(project, monkeypatch):
     solver._thread.join(60.0)
     assert searched == [1]
     assert solver.progress.words.startswith("No lens was found")
+
+
+def test_a_search_of_an_ended_editor_resumes(project, monkeypatch):
+    """Its end is that of a search without interruption: the same rounds, whatever the number of editors."""
+    rounds = 3
+    monkeypatch.setattr(search_job, "compile_kernels", lambda picture: None)
+    monkeypatch.setattr(search_job, "outcomes", lambda *_, **__: ())
+    monkeypatch.setattr(search_job, "obstacles", lambda *_, **__: ())
+    monkeypatch.setattr(search_job, "KEEP_EVERY_S", 0.0)
+    ghost_target = GhostTarget(ghost="4-1", move_mm=2.0, color=(1.0, 0.4, 0.1))
+    project = project.replace(lens="heliar-tronnier", design=Design(ghost_targets=(ghost_target,)))
+    states: list[PoolState] = []
+
+    def facts(state):
+        found = [(one.cost, one.structure, one.x.tobytes()) for run in state.runs for one in run.members]
+        return state.seed, state.next_run, state.searches, found
+
+    def searched(leave_after):
+        """Search until the end after three rounds, or until the editor ends."""
+        solver = Solver(_Session(project))
+
+        def through(problem, *, progress, cancelled, state, **_):
+            def note(now):
+                progress(now)
+                if len(states) == leave_after:
+                    solver.close()
+
+            while len(states) < rounds and not cancelled():
+                # without a time limit that depends on the machine
+                state = solve(problem, most_searches=state.searches + 1, state=state)
+                states.append(state)
+                note(state)
+            return state
+
+        monkeypatch.setattr(search_job, "solve", through)
+        solver.start(60.0)
+        solver._thread.join(60.0)
+
+    file = kept_search(project)
+    searched(leave_after=0)
+    whole = [facts(state) for state in states]
+    assert not file.exists()
+    states.clear()
+    searched(leave_after=2)
+    assert len(states) == 2
+    kept = read_kept(file)
+    assert facts(kept) == facts(states[-1])
+    assert kept.seconds == states[-1].seconds
+    searched(leave_after=0)
+    assert [facts(state) for state in states] == whole
+    assert not file.exists()
+    file.write_text("{")
+    assert read_kept(file) is None
 
 
 def test_lenses_are_described_and_the_best_comes_first(project, monkeypatch):

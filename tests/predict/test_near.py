@@ -13,6 +13,7 @@ from flarewright.model import Camera, Light, Output, Project, Quality
 from flarewright.optics.colour.rgb import luminance_weights
 from flarewright.predict import table
 from flarewright.predict.curves import Curves, interpolated_statistics
+from flarewright.predict.flare import fingerprint_of
 from flarewright.predict.lens_flare import square_flare, statistics_quality
 from flarewright.predict.plan import rounded_distance
 from flarewright.predict.table import FlareTable
@@ -20,7 +21,7 @@ from flarewright.predict.tracks import CameraSighting
 from flarewright.render.render import render
 
 
-def test_a_near_light_makes_the_flare_that_a_direct_render_shows():
+def test_a_near_light_makes_the_flare_that_a_direct_render_shows(monkeypatch):
     away, angle = 300.0, 14.0
     project = Project(
         lens="heliar-tronnier", f_number=5.6, lights=(Light(field_deg=(0.0, 0.0), distance=away),),
@@ -36,6 +37,11 @@ def test_a_near_light_makes_the_flare_that_a_direct_render_shows():
     far, _ = square_flare(project.replace(lights=(Light(field_deg=(0.0, 0.0)),)), statistics_quality("final"))
     assert abs(FlareTable(far, frame).at(angle, 0.0).mean / found.mean - 1.0) > 0.05
     assert far.fingerprint != flare.fingerprint
+    # pictures of another version of the program are drawn again
+    assert fingerprint_of("a") != fingerprint_of("b")
+    of_this = fingerprint_of("a")
+    monkeypatch.setattr("flarewright.predict.flare.__version__", "0.0.0")
+    assert fingerprint_of("a") != of_this
     assert flare.reach_deg < far.reach_deg == 85.0
 
 

@@ -11,7 +11,7 @@ import sys
 import time
 from collections.abc import Callable
 
-from .kinds import KINDS
+from .kinds import KINDS, SLOW
 from .worker import Tried, Worker
 
 
@@ -50,13 +50,16 @@ def rig(kinds: list[str], minutes: float, seed: int, report: Callable[[str], Non
 
 
 def table(done: list[tuple[str, Tried]]) -> str:
-    """Return one line per kind: inputs, broken promises, longest time, largest memory."""
+    """Return one line per kind: inputs, broken promises, longest time, largest memory, and why inputs were skipped."""
     lines = [f"{'kind':16} {'inputs':>7} {'broken':>7} {'longest':>10} {'memory':>10}"]
     for kind in dict.fromkeys(kind for kind, _ in done):
         of = [tried for each, tried in done if each == kind]
         broken = sum(not tried.verdict.held for tried in of)
         longest, peak = max(tried.cpu_s for tried in of), max(tried.peak_mb for tried in of)
-        lines.append(f"{kind:16} {len(of):7} {broken:7} {longest:6.1f} CPU s {peak:6.0f} MB")
+        skipped = {tried.verdict.remark for tried in of if tried.verdict.remark.startswith("skipped: ")}
+        lines.append(
+            f"{kind:16} {len(of):7} {broken:7} {longest:6.1f} CPU s {peak:6.0f} MB  {'; '.join(skipped)}".rstrip()
+        )
     return "\n".join(lines)
 
 
@@ -70,7 +73,8 @@ def main() -> int:
     unknown = set(given.kinds) - set(KINDS)
     if unknown:
         parser.error(f"no kind {', '.join(sorted(unknown))}; choose from {', '.join(KINDS)}")
-    done = rig(given.kinds or list(KINDS), given.minutes, given.seed, lambda line: print(line, flush=True))
+    default = [kind for kind in KINDS if given.minutes >= SLOW.get(kind, 0.0)]
+    done = rig(given.kinds or default, given.minutes, given.seed, lambda line: print(line, flush=True))
     print(table(done))
     return 1 if any(not tried.verdict.held for _, tried in done) else 0
 

@@ -96,9 +96,10 @@ def judged(arguments: Sequence[str], folder: Path, *, endless: bool = False, kee
             return False, f"a sentence of {len(errors[0])} characters: {errors[0][:200]!r}"
         if out.getvalue().strip() and not ("--json" in arguments and _strict(out.getvalue())):
             return False, f"an error, and on stdout {out.getvalue()[:80]!r}"
-        # the folder of a long job may hold a checkpoint
-        if any(path.parent == folder for path in written):
-            return False, f"an error, and the file {written[0].name}"
+        # the folder of a long job may hold a checkpoint, and so may the file beside a long job's output
+        left = [path.name for path in written if path.parent == folder and ".partial." not in path.name]
+        if left:
+            return False, f"an error, and the file {left[0]}"
         return True, errors[0].removeprefix(ERROR)
     if code != 0:
         return False, f"exit code {code}"

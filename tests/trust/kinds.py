@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from . import (
-    cache_damage,
-    editor_posts,
-    hostile_fields,
-    hostile_files,
-    hostile_flags,
-    kill_and_resume,
-    socket_messages,
-)
+from . import cache_damage, hostile_fields, hostile_files, hostile_flags, kill_and_resume, limited_machine
+from .editor import foreign_account, hostile_page, posts, sockets
 from .verdict import Verdict
 
 KINDS: dict[str, Callable[[int], Verdict]] = {
     "flags": hostile_flags.run,
     "fields": hostile_fields.run,
     "files": hostile_files.run,
-    "posts": editor_posts.run,
-    "sockets": socket_messages.run,
+    "posts": posts.run,
+    "sockets": sockets.run,
     "cache": cache_damage.run,
     "kill": kill_and_resume.run,
+    "memory": limited_machine.memory,
+    "disk": limited_machine.disk,
+    "account": foreign_account.run,
+    "page": hostile_page.run,
+    "stages": kill_and_resume.run_long,
 }
+
+# jobs of minutes: only when named, or when there is time for them, minutes
+SLOW = {"stages": 30.0}

@@ -28,6 +28,9 @@ def test_every_number_of_a_command_is_tried():
         ("measure replay", "--roll", "1e308"),
         ("measure explain", "--light", "1e999"),
         ("design identify", "--fstop", "-1"),
+        # these were noticed after merging, with its result on stdout
+        ("measure run", "--every", "4294967296"),
+        ("measure run", "--corrections", "x" * 5000),
     ],
     ids=" ".join,
 )

@@ -9,11 +9,13 @@ from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 
 from .answers import PATIENCE_S, peak_mb
-from .kinds import KINDS
+from .kinds import KINDS, SLOW
 from .verdict import Verdict
 
 # wall time after which a worker is killed, seconds: machines are slow and busy
 LOST_S = 300.0
+# whole measurements and galleries, several times
+LOST_LONG_S = 3600.0
 # no input may need more memory than this beside the program itself, MB
 MOST_MB = 1024.0
 # of address space for a worker, so that a wrong size ends in a MemoryError instead of a full machine
@@ -30,7 +32,8 @@ class Tried:
 
 
 def _work(pipe: Connection) -> None:
-    resource.setrlimit(resource.RLIMIT_AS, (SPACE, SPACE))
+    # a browser, which needs more, lifts the limit
+    resource.setrlimit(resource.RLIMIT_AS, (SPACE, resource.getrlimit(resource.RLIMIT_AS)[1]))
     while True:
         kind, seed = pipe.recv()
         before = time.process_time()
@@ -52,9 +55,10 @@ class Worker:
         process = self._process
         assert process is not None
         self._pipe.send((kind, seed))
-        if not self._pipe.poll(LOST_S):
+        patience_s = LOST_LONG_S if kind in SLOW else LOST_S
+        if not self._pipe.poll(patience_s):
             self.stop()
-            return Tried(Verdict(kind, f"seed {seed}", False, f"no answer in {LOST_S:g} s"), LOST_S, 0.0)
+            return Tried(Verdict(kind, f"seed {seed}", False, f"no answer in {patience_s:g} s"), patience_s, 0.0)
         try:
             tried: Tried = self._pipe.recv()
         except (EOFError, ConnectionResetError):

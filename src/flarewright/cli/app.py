@@ -44,6 +44,8 @@ from .render import ghosts_command as ghosts
 
 # messages of older releases of Typer on option values
 _TYPES = {"is not a valid float": "is no number", "is not a valid integer": "is no whole number"}
+# what the loader of libraries and the interpreter report if there is no memory for a library or for a thread's stack
+_NO_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread")
 # largest number of errors of a file that are listed
 _REPORTED = 20
 
@@ -222,10 +224,15 @@ def _call(words: list[str]) -> int:
             code: Any = app(args=words, prog_name="flarewright", standalone_mode=False)
     except FlarewrightError as error:
         return _fail(str(error), getattr(error, "problems", ()))
-    except (KeyboardInterrupt, typer.Abort):
+    except KeyboardInterrupt:
+        code = 130
+    except typer.Abort as error:
+        # Typer turns an EOFError of any call into this; no command asks questions, so it is a bug
+        if isinstance(error.__cause__, EOFError):
+            raise error.__cause__ from None
         code = 130
     except MemoryError:
-        return _fail(f"there is not enough memory for this; {_memory_advice(words)}")
+        return _fail(_no_memory(words))
     except BrokenPipeError:
         raise
     except OSError as error:
@@ -240,6 +247,8 @@ def _call(words: list[str]) -> int:
         # Usage errors come from Typer's copy of click or from click itself, by version; both have a message.
         if hasattr(error, "format_message"):
             return _fail(_usage(error))
+        if any(sign in str(error).lower() for sign in _NO_MEMORY) and isinstance(error, ImportError | RuntimeError):
+            return _fail(_no_memory(words))
         if not swallowed:
             raise
         code = 130
@@ -276,6 +285,10 @@ def _resuming(words: Sequence[str]) -> str:
     if job.kept(words):
         return ", and the same command resumes"
     return f"; with {job.needs[0]} or {job.needs[-1]} the same command would resume"
+
+
+def _no_memory(words: Sequence[str]) -> str:
+    return f"there is not enough memory for this; {_memory_advice(words)}"
 
 
 def _memory_advice(words: Sequence[str]) -> str:

@@ -23,9 +23,6 @@ EPILOG = (
 INTERRUPTED = 130
 # packages of the extra ui
 NEEDED = ("starlette", "uvicorn", "websockets")
-# addresses that listen on all interfaces: the address to open here, and one outside any network, whose route names the
-# address of the interface (nothing is sent)
-EVERYWHERE = {"0.0.0.0": ("127.0.0.1", "192.0.2.1"), "::": ("::1", "2001:db8::1")}
 
 
 def edit(
@@ -110,6 +107,9 @@ def hosts(host: str) -> tuple[str, ...]:
     tuple of str
         A single one if it is the same for all.
     """
+    # a web server's library, which `--help` need not import
+    from ..editor.server.access import EVERYWHERE
+
     if host not in EVERYWHERE:
         return (host,)
     here, beyond = EVERYWHERE[host]

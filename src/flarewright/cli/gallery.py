@@ -38,6 +38,7 @@ def gallery(
 
     Pictures of an earlier run are kept: an interrupted gallery resumes.
     """
+    from ..io.files.text_file import digest_of
     from ..io.images.contact_sheet import write_contact_sheet
     from ..render.gallery import cards
 
@@ -52,12 +53,12 @@ def gallery(
             bar(k / len(known), card.title)
             stamp = _stamp(card, size_px)
             file = f"{card.kind}-{card.name}.png"
-            whole = _digest(output / file)
+            whole = digest_of(output / file)
             if done.get(file) != {"of": stamp, "sha256": whole}:
                 if whole is not None and isinstance(kept := done.get(file), dict) and kept.get("of") == stamp:
                     print_remarks([f"{output / file} is damaged or was changed; it is rendered again"])
                 _render(card, size_px, output / file)
-                done[file] = {"of": stamp, "sha256": _digest(output / file)}
+                done[file] = {"of": stamp, "sha256": digest_of(output / file)}
                 write_text(output / _DONE, json.dumps(done, indent=1))
             figures.append(_figure(card, file, output / file))
     page, picture = write_contact_sheet(output, TITLE, figures)
@@ -133,14 +134,6 @@ def _stamp(card: Card, size_px: Sequence[int]) -> str:
     project = card_project(card, (size_px[0], size_px[1]))
     lens = read_bytes(lens_path(str(project.lens)), "a lens file")
     return sha256(f"{__version__} {project.model_dump_json()}".encode() + lens).hexdigest()[:16]
-
-
-def _digest(path: Path) -> str | None:
-    """Return a hash of a file's bytes; None if there is none to read."""
-    try:
-        return sha256(path.read_bytes()).hexdigest()
-    except OSError:
-        return None
 
 
 def _read_done(path: Path) -> dict[str, Any]:

@@ -5,11 +5,13 @@ A `Flare` is built from a lens (`lens_flare`) or from a measured model; the pred
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from .._version import __version__
 from ..model import Layer
 from ..optics.colour.rgb import luminance_weights
 from ..typing import Floats, Mask, Pixels
@@ -18,7 +20,22 @@ from ..typing import Floats, Mask, Pixels
 # of the direct image and leaves out the surroundings of the light instead
 NO_FLARE = ("beauty", "starburst")
 
-__all__ = ["Flare", "Frame", "luminance"]
+__all__ = ["Flare", "Frame", "fingerprint_of", "luminance"]
+
+
+def fingerprint_of(*inputs: str) -> str:
+    """Return a hash of what a flare is drawn from, and of the program's version, whose pictures may differ.
+
+    Parameters
+    ----------
+    *inputs : str
+
+    Returns
+    -------
+    str
+        64 hexadecimal digits.
+    """
+    return hashlib.sha256("\0".join((__version__, *inputs)).encode()).hexdigest()
 
 
 @dataclass(frozen=True)

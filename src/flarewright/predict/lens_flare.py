@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from math import acos, cos, degrees, radians
 
@@ -13,7 +12,7 @@ from ..render.render import render
 from ..render.scene.opening import make_opening
 from ..render.scene.resolve import ResolvedProject, resolve_project
 from ..render.scene.shots import make_shots
-from .flare import Flare, Frame
+from .flare import Flare, Frame, fingerprint_of
 from .wavelengths import luminous_lines
 
 # largest constellation; field angles are below 90 degrees, and grazing light carries no energy
@@ -97,7 +96,7 @@ def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
         scene_scale=float(summary["scene_irradiance_per_radiance"]),
         turns_by_deg=_turns_by(settled),
         reach_deg=largest_constellation(light.distance, settled.order.efl),
-        fingerprint=hashlib.sha256(prepared.model_dump_json().encode()).hexdigest(),
+        fingerprint=fingerprint_of(prepared.model_dump_json()),
         remarks=settled.remarks,
     )
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -183,7 +182,7 @@ def model_flare(
         When nothing counts.
     """
     from ..measure.replay.flare_only import counted_flare
-    from ..predict.flare import Flare, Frame
+    from ..predict.flare import Flare, Frame, fingerprint_of
     from ..predict.table import DECIMALS
 
     around = counting.around(model)
@@ -235,7 +234,7 @@ def model_flare(
         dark_beyond=False,
         unit=unit,
         per_lux=per_lux,
-        fingerprint=hashlib.sha256(drawn.model_dump_json().encode() + settings.encode()).hexdigest(),
+        fingerprint=fingerprint_of(drawn.model_dump_json(), settings),
         left_out=left_out,
         remarks=tuple(remarks),
     )

@@ -63,6 +63,15 @@ def test_a_shape_in_the_colour_is_the_picture_whatever_the_alpha(tmp_path):
         np.testing.assert_allclose(read_grey(exr(tmp_path / "a.exr", rgba)), colour, atol=1e-3)
 
 
+def test_an_exr_mask_is_opened_once(tmp_path, monkeypatch):
+    from flarewright.io.images import exr as reader
+
+    opened, real = [], reader.outside
+    monkeypatch.setattr(reader, "outside", lambda path, *rest, **more: opened.append(path) or real(path, *rest, **more))
+    read_grey(exr(tmp_path / "a.exr", pixels(1.0)))
+    assert opened == [tmp_path / "a.exr"]
+
+
 def test_pictures_without_alpha_are_what_they_were(tmp_path):
     Image.fromarray(np.round(255.0 * SHAPE).astype(np.uint8)).save(tmp_path / "l.png")
     Image.fromarray(np.round(65535.0 * SHAPE).astype(np.uint16)).save(tmp_path / "deep.png")

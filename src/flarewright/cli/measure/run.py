@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -92,6 +93,8 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Run the stages of a measurement in order; finished stages are kept."""
+    from ...io.measurement.ghost_model_file import read_corrections
+
     chosen = chosen_stages(stages)
     _check_there(captures)
     if corrections is not None and "find" not in chosen:
@@ -101,10 +104,13 @@ def run(
             "--no-residual is for the stages fit and compress, which --stages omits: add one, or drop it"
         )
     _check_way(by, chosen)
+    if corrections is not None:
+        # the stage would raise hours later
+        read_corrections(corrections)
     settings = _settings(block, white_balance, upright)
     facts: dict[str, Any] = {"folder": str(output), "stages": chosen}
     if "merge" in chosen:
-        merged = _merge(captures, output, camera, angles, settings, threads)
+        merged = _merge(captures, output, camera, angles, settings, threads, 1 if chosen == ["merge"] else every)
         print_remarks(merged.remarks)
         facts["merge"] = merge_summary(merged)
         if not as_json:
@@ -151,10 +157,18 @@ def _settings(block: int, white_balance: str, upright: bool) -> MergeSettings:
 
 
 def _merge(
-    captures: Path, output: Path, camera: Path | None, angles: str | None, settings: MergeSettings, threads: int | None
+    captures: Path,
+    output: Path,
+    camera: Path | None,
+    angles: str | None,
+    settings: MergeSettings,
+    threads: int | None,
+    every: int = 1,
 ) -> MergedRun:
+    """Merge exposures; `every` n-th frame is what later stages use, which is checked first."""
     from ...io.measurement.captures import captures_folder, parse_rule, read_capture_list
-    from ...measure.pipeline.merge_stage import check_same_run, merge_captures
+    from ...measure.core.frame_reading import check_every
+    from ...measure.pipeline.merge_stage import check_same_run, exposure_groups, merge_captures
     from ...measure.report.overview import write_overview
 
     _check_there(captures)
@@ -165,6 +179,8 @@ def _merge(
         started = begin("merge")
         started(0.0, "reading the list")
         listed, remarks = read_capture_list(captures, rule)
+        rolls = Counter(group[0].roll_deg for group in exposure_groups(listed))
+        check_every(list(rolls.values()), every, captures)
         merged = merge_captures(
             listed,
             captures_folder(captures),

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from ...design.results.report import verdict
 from ...design.solvers.evolution_log import until
 from ...design.solvers.polish import compile_kernels
 from ...design.solvers.pool_search import PoolState, solve
-from ...errors import FlarewrightError, ProjectError
+from ...errors import FlarewrightError, OutputError, ProjectError
 from ...io.files.sentences import count
 from ...model import AsLens, CoatingChoice, Design, Everywhere, InTurn, Lens, PerRow, Project, Surface
 from ...optics.rays.pack import resolve_coatings
@@ -36,9 +37,12 @@ from ..preview.picture import Grade
 from ..preview.render_picture import chosen_light, exposure_of, has_no_ghosts, take
 from ..session.session import Session
 from ..session.view_settings import View
+from .kept_search import drop, keep, kept_search, read_kept
 
 CANDIDATES = 5
 LOOK_EVERY_S = 1.0
+# the search is stored this often, for an editor that is ended or killed meanwhile
+KEEP_EVERY_S = 10.0
 # fraction of the time for finishing lenses with traced rays
 FINISHING = 0.25
 THUMB_SCALE = 0.4
@@ -120,6 +124,8 @@ class Solver:
         # the lens at the start of the search
         self._searched: Lens | str | None = None
         self._stop = threading.Event()
+        # whether the editor ends: then the search is kept for the next one
+        self._closing = False
         # set once the search reacts to a stop; the first compilation on a computer does not
         self._ready = threading.Event()
         self._thread: threading.Thread | None = None
@@ -191,7 +197,8 @@ class Solver:
             self._report(False, "Stopped before the search began", 0.0, self.progress.found)
 
     def close(self) -> None:
-        """Ask the search to end, without waiting for it."""
+        """Ask the search to end, without waiting for it; the next editor can resume it."""
+        self._closing = True
         self._stop.set()
         self._tracing.close()
 
@@ -228,11 +235,17 @@ class Solver:
         if stop.is_set():
             return
         ready.set()
-        looked = 0.0
+        looked, stored, file = 0.0, time.perf_counter(), kept_search(project)
+        begun = read_kept(file) or PoolState(0)
+        if begun.searches:
+            self._report(True, f"Resuming a search of {count(begun.searches, 'try', 'tries')}", begun.seconds, ())
 
         def look(state: PoolState) -> None:
-            nonlocal looked
+            nonlocal looked, stored
             now = time.perf_counter()
+            if now - stored >= KEEP_EVERY_S:
+                stored = now
+                self._keep(file, state)
             if now - looked < LOOK_EVERY_S:
                 return
             looked = now
@@ -243,7 +256,13 @@ class Solver:
         scratch = project.design is not None and not project.design.own_ghosts
         finished = replace(problem, traced=problem.traced or scratch)
         rest = FINISHING * seconds if finished.traced else 0.0
-        state = solve(problem, time_limit=seconds - rest, progress=look, cancelled=stop.is_set)
+        # a resumed search has the rest of its time
+        limit = max(seconds - rest - begun.seconds, 0.0)
+        state = solve(problem, time_limit=limit, progress=look, cancelled=stop.is_set, state=begun)
+        if self._closing:
+            self._keep(file, state)
+            return
+        drop(file)
         over = until(seconds - state.seconds, stop.is_set)
         found = self._found(project, finished, state, CANDIDATES, name, over)
         reported = (
@@ -256,6 +275,13 @@ class Solver:
             why = " ".join(f"{one.target}: {one.reason}" for one in proven)
             reported = f"No lens can do that: {named(why, project.design)} ({reported})"
         self._end(project, reported, state.seconds, found)
+
+    def _keep(self, file: Path, state: PoolState) -> None:
+        try:
+            keep(file, state)
+        except OutputError as error:
+            # a full disk does not end the search
+            self.session.tell({"type": "message", "kind": "warning", "text": f"The search is not kept: {error}"})
 
     def _found(
         self, project: Project, problem: Problem, state: PoolState, count: int, name: str,

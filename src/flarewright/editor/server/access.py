@@ -17,8 +17,9 @@ from ...errors import ProjectError
 
 COOKIE = "flarewright_token"
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
-# addresses that listen on all interfaces
-EVERYWHERE = ("0.0.0.0", "::")
+# addresses that listen on all interfaces: the address to open here, and one outside any network, whose route names the
+# address of the interface (nothing is sent)
+EVERYWHERE = {"0.0.0.0": ("127.0.0.1", "192.0.2.1"), "::": ("::1", "2001:db8::1")}
 # least length of a token, characters
 SHORTEST = 8
 

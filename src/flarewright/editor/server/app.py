@@ -45,7 +45,7 @@ from .messages import brief, object_of
 from .page_state import ghost_rows
 from .turns import Crowded
 from .uploads import MOST_BYTES, take_in
-from .workspace import MOST_SOCKETS, TRY_AGAIN, Workspace, received
+from .workspace import MOST_SOCKETS, TRY_AGAIN, Workspace, delivered, received
 
 STATIC = Path(__file__).parents[1] / "static"
 IMPORT = "/api/import"
@@ -210,8 +210,7 @@ async def _follow(workspace: Workspace, socket: WebSocket) -> None:
 
     async def send(head: dict[str, Any], picture: bytes = b"") -> None:
         # the tab may be closed by now
-        with suppress(RuntimeError, WebSocketDisconnect):
-            await socket.send_bytes(json.dumps(head).encode() + b"\n" + picture)
+        await delivered(socket, json.dumps(head).encode() + b"\n" + picture)
 
     async def answer(asked: dict[str, Any]) -> None:
         head: dict[str, Any] = {"number": asked.get("number")}

@@ -10,8 +10,10 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from ...errors import ProjectError
+from ...errors import FileError, ProjectError
+from ...io.files.door import expanded
 from ...io.files.state_folder import state_folder
+from ...io.files.text_file import read_text
 
 VARIABLE = "FLAREWRIGHT_TOKEN"
 NAME = "editor-token"
@@ -45,13 +47,10 @@ def token_of(file: Path | None, environment: Mapping[str, str] = os.environ) -> 
 
 def _read(file: Path) -> str:
     try:
-        with file.expanduser().open("rb") as source:
-            data = source.read(MOST_BYTES + 1)
-        text = data.decode().strip()
-    except (OSError, RuntimeError, ValueError) as error:
-        why = getattr(error, "strerror", None) or "it is no text"
-        raise ProjectError(f"--token-file {file}: cannot be read ({why})") from None
-    if len(data) > MOST_BYTES or not text.isprintable():
+        text = read_text(expanded(file), "a token", MOST_BYTES).strip()
+    except FileError as error:
+        raise ProjectError(f"--token-file: {error}") from None
+    if not text.isprintable():
         raise ProjectError(f"--token-file {file}: it must hold one line with the token")
     return text
 

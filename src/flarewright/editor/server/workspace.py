@@ -155,6 +155,20 @@ async def received(socket: WebSocket) -> str | bytes:
     return message.get("text") or message.get("bytes") or b""
 
 
+async def delivered(socket: WebSocket, data: str | bytes) -> bool:
+    """Send a message to a socket; return whether the client is still there.
+
+    asyncio reports a lost connection in a later turn of its loop, so each message waits for one: otherwise the messages
+    of a flood would be written to a closed connection, each with a warning of asyncio.
+    """
+    try:
+        await (socket.send_text(data) if isinstance(data, str) else socket.send_bytes(data))
+    except (RuntimeError, WebSocketDisconnect):
+        return False
+    await asyncio.sleep(0)
+    return True
+
+
 def _side(value: Any) -> int:
     return int(min(max(float(value), SIDES[0]), SIDES[1]))
 
@@ -164,4 +178,5 @@ async def _send(socket: WebSocket, tab: Tab) -> None:
         await tab.news.wait()
         tab.news.clear()
         while tab.unread:
-            await socket.send_text(json.dumps(tab.unread.pop(next(iter(tab.unread)))))
+            if not await delivered(socket, json.dumps(tab.unread.pop(next(iter(tab.unread))))):
+                return

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import FlarewrightError, ProjectError
-from ...io.lens.library import lens_path, library_names
+from ...io.lens.library import lens_path, library_names, near_names
 from ...measure.replay.measured_project import is_measured
 from ...model import Project
 from ...render.scene.resolve import open_lens
@@ -56,9 +56,24 @@ class Reach:
         )
 
     def check_name(self, text: str) -> None:
-        """Check a path, or a name of the library, which is always allowed."""
-        if not _shipped(text):
+        """Check a path, or a name of the library, which is always allowed; a misspelt name is reported as one.
+
+        Raises
+        ------
+        ProjectError
+            As `check`; whether a file exists is not reported.
+        """
+        if _shipped(text):
+            return
+        try:
             self.check(text)
+        except ProjectError:
+            if Path(text).parent != Path() or Path(text).suffix or not text:
+                raise
+            hint = f" (did you mean {' or '.join(near)}?)" if (near := near_names(text)) else ""
+            raise ProjectError(
+                f"{text!r:.120} is neither a shipped lens{hint} nor a file in the folders of this editor"
+            ) from None
 
     def check_project(self, project: Project, before: Project | None = None) -> None:
         """Check every file that a project reads and an earlier state of it does not."""

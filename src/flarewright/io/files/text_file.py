@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 import tomllib
@@ -20,6 +21,18 @@ LARGEST = 4_000_000
 _DEEPEST = 64
 _STRINGS = re.compile(r""""(?:[^"\\]|\\.)*"|'[^']*'""")
 _DEEP_KEY = re.compile(rf"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*){{{_DEEPEST}}}")
+
+
+def digest_of(path: str | Path) -> str | None:
+    """Return the SHA-256 of a file's bytes as hexadecimal digits; None if there is no file to read."""
+    try:
+        digest = hashlib.sha256()
+        with outside(path, "a file") as file:
+            while part := file.read(1_000_000):
+                digest.update(part)
+        return digest.hexdigest()
+    except FileError:
+        return None
 
 
 def read_bytes(path: str | Path, what: str, largest: int = LARGEST) -> bytes:

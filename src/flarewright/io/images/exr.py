@@ -20,7 +20,9 @@ writes every layer at the size of the picture.
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import frexp, inf
@@ -54,6 +56,8 @@ _PREFIX = "flarewright."
 _SCALE = f"{_PREFIX}scale"
 _CHANNELS = "RGB"
 
+# with less space left on the disk than this, bytes, a written file is read again
+_SPARE = 1_000_000
 # the library prints errors to stdout; redirecting stdout affects all threads
 _REDIRECT_LOCK = Lock()
 
@@ -190,6 +194,12 @@ def _write_parts(parts: list[Any], temporary: Path, path: str | PathLike[str]) -
         message = str(error).rstrip(".")
         reason = message.partition(f'"{temporary}". ')[2]
         raise OSError(reason or message.replace(str(temporary), str(path))) from error
+    if shutil.disk_usage(temporary.parent).free < _SPARE:
+        # the library ignores errors of the last bytes, which it writes when it closes a file
+        try:
+            _open_parts(temporary, "an EXR file")
+        except FileError:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from None
 
 
 def read_exr(path: str | PathLike[str]) -> ExrContents:
@@ -236,11 +246,11 @@ def _contents(file: Any) -> ExrContents:
     return ExrContents(tuple(layers), size, kind, metadata, header, scales[0])
 
 
-def _open_parts(path: str | PathLike[str], what: str) -> Any:
+def _open_parts(path: str | PathLike[str], what: str, pixel_bytes: int = 8) -> Any:
     """Open a file with all its parts; raises FileError also for damaged parts, which the library silently skips."""
     import OpenEXR
 
-    with outside(path, what, pixel_bytes=8, remedy="give an EXR file"):
+    with outside(path, what, pixel_bytes=pixel_bytes, remedy="give an EXR file"):
         # the library's message about such a name is none
         str(path).encode()
         with _REDIRECT_LOCK, silenced():
@@ -273,9 +283,34 @@ def read_exr_plane(path: str | PathLike[str], choices: Sequence[Sequence[str]], 
         When it is not a readable EXR file, or has none of these channels.
     """
     with sentences_for(path, what, "give an EXR file"):
-        part, names = _part_with(path, choices, what)
-        mean = np.mean([np.asarray(part.channels[name].pixels, float) for name in names], axis=0)
-        return _over_display(part, mean / _scale(part))
+        return _plane(*_part_with(_open_parts(path, what), choices))
+
+
+def read_exr_grey(
+    path: str | PathLike[str], choices: Sequence[Sequence[str]], what: str = "an image"
+) -> tuple[Floats, Floats | None]:
+    """Read a grey picture and its alpha, opening the file once.
+
+    Parameters
+    ----------
+    path, choices, what
+        As of `read_exr_plane`.
+
+    Returns
+    -------
+    grey, alpha : ndarray, shape (H, W)
+        As of `read_exr_plane`; no alpha without a channel A.
+
+    Raises
+    ------
+    FileError
+        As `read_exr_plane`.
+    """
+    with sentences_for(path, what, "give an EXR file"):
+        file = _open_parts(path, what, 16)
+        grey = _plane(*_part_with(file, choices))
+        part = next((part for part in file.parts if "A" in part.channels), None)
+        return grey, None if part is None else _plane(part, ("A",))
 
 
 def read_exr_colour(path: str | PathLike[str], what: str = "an EXR file") -> Pixels:
@@ -299,16 +334,21 @@ def read_exr_colour(path: str | PathLike[str], what: str = "an EXR file") -> Pix
         When it is not a readable EXR file, or has none of these channels.
     """
     with sentences_for(path, what, "give an EXR file"):
-        part, names = _part_with(path, (("R", "G", "B"), ("Y",)), what)
+        part, names = _part_with(_open_parts(path, what), (("R", "G", "B"), ("Y",)))
         values = [np.asarray(part.channels[name].pixels, dtype=np.float64) / _scale(part) for name in names]
         planes = [_over_display(part, plane) for plane in values]
         colours = np.stack(planes if len(planes) == 3 else [planes[0]] * 3, axis=-1).astype(np.float32)
         return np.where(np.isfinite(colours), colours, np.float32(0.0))
 
 
-def _part_with(path: str | PathLike[str], choices: Sequence[Sequence[str]], what: str) -> tuple[Any, Sequence[str]]:
+def _plane(part: Any, names: Sequence[str]) -> Floats:
+    """Return the mean of channels within the display window."""
+    mean = np.mean([np.asarray(part.channels[name].pixels, float) for name in names], axis=0)
+    return _over_display(part, mean / _scale(part))
+
+
+def _part_with(file: Any, choices: Sequence[Sequence[str]]) -> tuple[Any, Sequence[str]]:
     """Return the part and the channels of the first set that a file has; a single channel can have any name."""
-    file = _open_parts(path, what)
     known = [name for part in file.parts for name in part.channels]
     wanted = [*choices, known] if len(known) == 1 else choices
     found = [(part, names) for names in wanted for part in file.parts if all(name in part.channels for name in names)]

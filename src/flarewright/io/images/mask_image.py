@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...errors import FileError, ProjectError
 from ...typing import Floats
 from ..files.door import outside
-from .exr import read_exr_plane
+from .exr import read_exr_grey
 
 # finer masks cost time without benefit: edges are antialiased
 LARGEST = 4096
@@ -61,8 +61,12 @@ def read_grey(path: Path, dtype: type[np.floating[Any]] = np.float64) -> NDArray
     An alpha channel is the picture when all pixels that are not transparent have one colour: then only alpha holds the
     shape. Otherwise alpha is ignored. The colour of transparent pixels never counts.
     """
-    with outside(path, "an image", pixel_bytes=2 * np.dtype(dtype).itemsize, remedy="give a PNG or EXR file") as file:
-        grey, alpha = _read_exr(path, dtype) if path.suffix.lower() == ".exr" else _read_picture(file, dtype)
+    if path.suffix.lower() == ".exr":
+        grey, alpha = _read_exr(path, dtype)
+    else:
+        claim = 2 * np.dtype(dtype).itemsize
+        with outside(path, "an image", pixel_bytes=claim, remedy="give a PNG or EXR file") as file:
+            grey, alpha = _read_picture(file, dtype)
     if alpha is None or np.ptp(alpha) == 0.0:
         return grey
     return alpha if np.ptp(grey[alpha > 0.0]) == 0.0 else grey
@@ -83,9 +87,6 @@ def _read_picture(file: BinaryIO, dtype: type[np.floating[Any]]) -> tuple[NDArra
 
 def _read_exr(path: Path, dtype: type[np.floating[Any]]) -> tuple[NDArray[Any], NDArray[Any] | None]:
     # a matte can have one channel, or grey with alpha
-    grey = read_exr_plane(path, (("R", "G", "B"), ("Y",), ("R",), ("A",)), "an image").astype(dtype, copy=False)
-    try:
-        alpha = read_exr_plane(path, (("A",),)).astype(dtype, copy=False)
-    except ValueError:
-        return grey, None
-    return grey, alpha if alpha.shape == grey.shape else None
+    grey, alpha = read_exr_grey(path, (("R", "G", "B"), ("Y",), ("R",), ("A",)))
+    kept = None if alpha is None or alpha.shape != grey.shape else alpha.astype(dtype, copy=False)
+    return grey.astype(dtype, copy=False), kept

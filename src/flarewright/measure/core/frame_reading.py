@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -27,11 +28,31 @@ def read_views(
     rolls: dict[float, list[FrameInfo]] = {}
     for each in sorted(run.frames, key=lambda one: (one.nominal_deg, one.constellation_deg)):
         rolls.setdefault(each.nominal_roll_deg, []).append(each)
+    check_every([len(turned) for turned in rolls.values()], every, folder)
     frames = [each for turned in rolls.values() for each in turned[::every]]
-    if len(frames) < 3 <= len(run.frames):
-        raise FlarewrightError(
-            f"{folder}: --every {every} leaves {len(frames)} of {len(run.frames)} constellations, too few to follow a "
-            f"ghost; use at most --every {max(1, (len(run.frames) - 1) // 2)}"
-        )
     frames.sort(key=lambda each: (each.constellation_deg, each.roll_deg))
     return views_of(map_batched(partial(read_frame, folder), frames, pool=pool), largest)
+
+
+def check_every(sizes: Sequence[int], every: int, where: Path) -> None:
+    """Check that every n-th frame of each roll leaves enough to follow a ghost.
+
+    Parameters
+    ----------
+    sizes : sequence of int
+        Number of frames of each roll.
+    every : int
+    where : Path
+        For the message.
+
+    Raises
+    ------
+    FlarewrightError
+        When fewer than three of at least three frames remain.
+    """
+    total, kept = sum(sizes), sum(len(range(0, size, every)) for size in sizes)
+    if kept < 3 <= total:
+        raise FlarewrightError(
+            f"{where}: --every {every} leaves {kept} of {total} constellations, too few to follow a ghost; use at most "
+            f"--every {max(1, (total - 1) // 2)}"
+        )

@@ -22,7 +22,7 @@ import numpy as np
 from ...errors import FileError, FlarewrightError, OutputError
 from ...io.files.atomic_write import write_atomically
 from ...io.files.sentences import count
-from ...io.files.text_file import read_json
+from ...io.files.text_file import digest_of, read_json
 from ...io.images.photo import open_photo
 from ...io.measurement.merged import read_frame, read_run, write_frame, write_run
 from ...model.measurement.capture import OF_LIGHT, CameraNoise, Capture, FrameInfo, Matrix3, MergedFrame, MergedRun
@@ -99,7 +99,7 @@ def merge_captures(
     tell = progress or (lambda _part, _words: None)
     tell(0.0, "reading the photographs")
     known = calibrate(captures, folder, camera or CameraNoise(), settings.block, settings)
-    groups = _groups(captures)
+    groups = exposure_groups(captures)
     balance = _balance(settings, known, folder / groups[0][0].file)
     _refuse_other_run(output, folder, captures, known.size_px)
     output = _folder(output, len(groups), known.size_px)
@@ -129,8 +129,8 @@ def _balance(settings: MergeSettings, known: CameraCalibration, photograph: Path
     return known.white_balance
 
 
-def _groups(captures: Sequence[Capture]) -> list[tuple[Capture, ...]]:
-    """Group the exposures by roll and constellation angle."""
+def exposure_groups(captures: Sequence[Capture]) -> list[tuple[Capture, ...]]:
+    """Return the exposures of each frame, in the order of roll and constellation angle."""
     groups: dict[tuple[float, float], list[Capture]] = {}
     for one in captures:
         if one.kind == "light":
@@ -257,7 +257,7 @@ def _frame(
                      light_px=sighting.position_px, axis_px=(0.0, 0.0))  # fmt: skip
     write_frame(output, MergedFrame(info, mean, variance))
     facts = {
-        "digest": digest, "sha256": _file_digest(output / file), "sighting": asdict(sighting),
+        "digest": digest, "sha256": digest_of(output / file), "sighting": asdict(sighting),
         "ratios": [asdict(one) for one in ratios], "from": _origin(folder, group),
     }  # fmt: skip
     write_atomically(note, lambda temporary: _write(temporary, json.dumps(facts) + "\n"))
@@ -310,11 +310,6 @@ def _read_note(note: Path) -> dict[str, Any]:
     return data if isinstance(data, dict) else {}
 
 
-def _file_digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
 def _kept_sighting(note: Path, digest: str, frame: Path, report: Report) -> LightSighting | None:
     """Return the sighting in a frame's note if the digest matches and the frame's file is whole."""
     try:
@@ -323,7 +318,7 @@ def _kept_sighting(note: Path, digest: str, frame: Path, report: Report) -> Ligh
             return None
         size = frame.stat().st_size
         # earlier releases noted the number of bytes
-        whole = _file_digest(frame) == data["sha256"] if "sha256" in data else data.get("bytes", size) == size
+        whole = digest_of(frame) == data["sha256"] if "sha256" in data else data.get("bytes", size) == size
         if not whole:
             report(f"{frame} is damaged or was changed; it is merged again")
             return None

@@ -213,9 +213,20 @@ def find_region(
     whole, few_cells = True, 1 if quick else FEW_CELLS
     held, slivers = np.array([np.inf, -np.inf, np.inf, -np.inf]), False
     halved = 0
+    # what the finer scans have covered
+    searched = np.array([np.inf, -np.inf, np.inf, -np.inf])
     for _ in range(MOST_SCANS):
+        if not whole:
+            searched = join_boxes(searched, box)
         found, sums, spots = _scan(
-            packed, middle, box, cells, finest, traced if whole else None, few_cells, slivers=whole and not quick
+            packed,
+            middle,
+            box,
+            cells,
+            finest,
+            traced if whole else None,
+            few_cells,
+            slivers=(whole or slivers) and not quick,
         )
         slivers = slivers or bool(spots[1] > spots[0])
         plenty = sums[4] >= (BLOB if whole else SMALL_REGION)
@@ -239,13 +250,18 @@ def find_region(
         if quick and (not shrunk or sums[4] >= BLOB):
             break
         few_lit = sums[5] * cells[0] * cells[1] < FEW_LIT * _area(box)
-        # light in few cells that comes to a side of its box may continue beyond
-        open_sides = (found == box) & (box != first) & (sums[4] < SMALL_REGION)
+        # light in few cells that comes to a side of its box may continue beyond, unless a finer scan has looked there
+        open_sides = (found == box) & (box == searched) & (box != first) & (sums[4] < SMALL_REGION)
+        # and a sliver that comes to a side was too narrow for the samples beyond
+        open_sides |= (found == box) & (box != first) & (spots == box)
         if few_lit and not shrunk and halved < HALVED:
             box, cells = found, (2 * cells[0], 2 * cells[1])
             halved += 1
         elif open_sides.any():
-            box = np.where(open_sides, _widened(found, first), found)
+            wide = np.where(open_sides, _widened(found, first), found)
+            # as dense as before: wider cells would lose the light at the sides again
+            parts = (wide[1::2] - wide[0::2]) / (box[1::2] - box[0::2])
+            box, cells = wide, (max(ceil(cells[0] * parts[0]), cells[0]), max(ceil(cells[1] * parts[1]), cells[1]))
         elif shrunk:
             box, cells = found, cells_across(packed, FINER)
         else:

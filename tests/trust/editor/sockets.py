@@ -7,8 +7,8 @@ import random
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
+from ..verdict import Verdict
 from .live_editor import PATIENCE_S, live_editor
-from .verdict import Verdict
 
 # the client's library logs tracebacks of connections that the editor ends
 CLIENT = logging.getLogger("flarewright.trust.client")

@@ -6,8 +6,8 @@ import random
 from flarewright.editor.commands.registry import COMMANDS
 from flarewright.editor.server.app import _GET, _POST
 
+from ..verdict import Verdict
 from .live_editor import live_editor
-from .verdict import Verdict
 
 KIND = "editor post"
 # requests of one seed

@@ -1,0 +1,1 @@
+"""Hostile inputs of the editor: requests, sockets, other accounts, web pages and long use."""
