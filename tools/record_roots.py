@@ -39,14 +39,28 @@ SPIKES = {"output": {"starburst": True}}
 FAN = {"output": {"starburst": True}, "iris": {"blades": 0}}
 MASKED = {"iris": {"blades": 0, "mask": "iris.png"}}
 SCATTER = {"scatter": {"model": "abg"}}
+DISC = {"lights": [{"field_deg": (8.0, 4.0), "diameter_deg": 0.25}]}
 CROWD = {"lights": [{"field_deg": (8.0 - 0.5 * k, 4.0)} for k in range(8)]}
 SHAPED = {"imperfection": {"seed": 1}}
 # (features,), each of which selects kernels
 RENDERS: tuple[tuple[dict[str, Any], ...], ...] = (
     (), (COLOURS,), (COLOURS, COATED), (RINGS,), (SEEN_RINGS,), (SPIKES,), (FAN,), (SCATTER,), (MASKED,),
     (MASKED, SPIKES), (MASKED, COLOURS, COATED), (MASKED, SEEN_RINGS), (COLOURS, COATED, SEEN_RINGS, SPIKES),
+    (DISC,), (MASKED, DISC),
 )  # fmt: skip
-DRAFTS = ((), (COLOURS,), (COATED,), (COLOURS, COATED), (CROWD,), (SPIKES,), (FAN,), (SCATTER,), (MASKED,))
+DRAFTS = (
+    (),
+    (COLOURS,),
+    (COATED,),
+    (COLOURS, COATED),
+    (CROWD,),
+    (SPIKES,),
+    (FAN,),
+    (SCATTER,),
+    (MASKED,),
+    (COATED, SPIKES),
+    (COATED, FAN),
+)
 REFERENCES = ((), (SCATTER,))
 # features that no trait names: their kernels are compiled by `warm-up`, or at their first call
 OTHERS: tuple[dict[str, Any], ...] = (

@@ -85,6 +85,7 @@ def traits(project: Project) -> set[str]:
     seen = project.f_number is not None and not all(light.extended for light in project.lights)
     crowded = len(ghost_paths(settled.lens, quality.paths)) * len(project.lights) >= CROWDED_GHOSTS
     optional = {
+        "area": any(light.extended for light in project.lights),
         "coated": coated,
         "colours": quality.bridge and quality.wavelengths > 1,
         "crowded": crowded,

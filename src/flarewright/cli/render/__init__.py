@@ -5,6 +5,7 @@
 - `project_flags`: `build_project` converts options to a project
 - `look_flags`: `--look`, and photographic defaults of library lenses
 - `art_flags`: options for overrides: `--rule`, `--solo`, `--mute`, `--gain`, `--physical`
+- `profile_table`: `--profile`, the table of what each ghost costs
 - `preview`: the PNG: options, exposure, file
 - `ghosts_command`: `ghosts`, the ghost analysis of a lens
 """

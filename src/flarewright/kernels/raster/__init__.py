@@ -4,6 +4,7 @@
 - `polygons`: convex polygons in blocks of pixels: `blank_plane`, `fill_polygon`, `to_pixels`, `sum_rows`
 - `iris_mask`: polygons multiplied by an iris image
 - `stop_pattern`: patterns in the stop plane and their look-up, pixel by pixel: `weave`
+- `spread`: `spread_taps`, convolution of a picture with a small kernel
 - `edge_blur`: `spread_marks`, convolution of a picture stored as differences with a flat shape
 - `pyramid`: `collect` and `add_doubled`, from blocks at several resolutions to pixels
 - `display_codes`: `encode`, `encode_sum`, `compress_gamut`: linear light to 8-bit codes

@@ -18,6 +18,7 @@ Modules:
 - `ring_visibility`: `ripples_seen`: whether rings are visible
 - `background_level`: `surroundings`: coarse picture of the light around each ghost
 - `visible_stop`: `seen_in_stop`: the part of the stop that a picture shows
-- `extent_blur`: `blur_by_extent`, `shape_kernel`: convolution with the shape of a light or of a defocused aperture
+- `cost`: `CostMeter`, `GhostCost`: time and work of each ghost, for `render --profile`
+- `extent_blur`: `blur_by_extent`, `spread_window`, `shape_kernel`: convolution with the shape of a light or of a defocused aperture
 - `art_filters`: `filtered_ghost`: colour ramps and blurs of art direction
 """
