@@ -19,6 +19,7 @@ Modules:
 - `background_level`: `surroundings`: coarse picture of the light around each ghost
 - `visible_stop`: `seen_in_stop`: the part of the stop that a picture shows
 - `cost`: `CostMeter`, `GhostCost`: time and work of each ghost, for `render --profile`
-- `extent_blur`: `blur_by_extent`, `spread_window`, `shape_kernel`: convolution with the shape of a light or of a defocused aperture
+- `extent_blur`: `blur_by_extent`, `spread_window`, `shape_kernel`: convolution with the shape of a light or of a
+  defocused aperture
 - `art_filters`: `filtered_ghost`: colour ramps and blurs of art direction
 """
