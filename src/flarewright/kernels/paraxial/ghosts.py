@@ -169,8 +169,19 @@ def _meridians(rows, actions, lens, curvature_x, nearness, crossings, to_stop, a
 @inner
 def _fill_sines(rows, actions, lens, curvature_x, light, iris_radius, to_stop, across, squares):
     """Fill the angles of incidence of the ray that gives a ghost's colour (`paraxial_sines`)."""
-    centre = _centre(to_stop, light.slope, iris_radius, light.semi)
-    beside = 0.0 if curvature_x is None else _centre(across, light.slope_x, iris_radius, light.semi)
+    middle, reach = _iris_image(to_stop, light.slope, iris_radius, light.semi)
+    if curvature_x is None:
+        centre, beside = _middle_of_both(middle, reach, light.semi), 0.0
+    else:
+        # the image of the iris is an ellipse, cut by the line from the middle of the entrance to its own
+        aside, width = _iris_image(across, light.slope_x, iris_radius, light.semi)
+        off = sqrt(middle * middle + aside * aside)
+        centre, beside = 0.0, 0.0
+        if off > 0.0:
+            up, along = middle / off, aside / off
+            part = sqrt((up / reach) ** 2 + (along / width) ** 2)
+            place = _middle_of_both(off, 1.0 / part if part > 0.0 else np.inf, light.semi)
+            centre, beside = up * place, along * place
     paraxial_sines(
         rows, actions, lens.curvature, curvature_x, lens.z_vertex, lens.n_gap,
         centre, light.slope + light.nearness * centre, beside, light.slope_x + light.nearness * beside, squares,
@@ -366,16 +377,21 @@ def _square(polygon, x, y):
 
 
 @inner
-def _centre(to_stop, slope, iris_radius, entrance):
-    """Return the height at the entrance of the ray that gives a ghost's colour: the middle of what passes both rims.
+def _iris_image(to_stop, slope, iris_radius, entrance):
+    """Return middle and radius, mm, of the iris seen from the entrance in one plane; 0 and inf: it bounds nothing."""
+    ma, mb = to_stop[0, 0, 0], to_stop[0, 0, 1]
+    if abs(ma) * entrance <= 1e-12 * iris_radius:
+        return 0.0, np.inf
+    return -mb * slope / ma, iris_radius / abs(ma)
+
+
+@inner
+def _middle_of_both(middle, reach, entrance):
+    """Return the middle of what passes both the entrance and an image of the iris, along the line of their middles.
 
     A choice between the middles of the iris and of the entrance would jump where both are equally large, and the ray
     could miss the light.
     """
-    ma, mb = to_stop[0, 0, 0], to_stop[0, 0, 1]
-    if abs(ma) * entrance <= 1e-12 * iris_radius:
-        return 0.0
-    middle, reach = -mb * slope / ma, iris_radius / abs(ma)
     return 0.5 * (max(middle - reach, -entrance) + min(middle + reach, entrance))
 
 
