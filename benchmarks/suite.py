@@ -101,7 +101,8 @@ def frames(lens: str, size: tuple[int, int], works: Sequence[Work] = WORKS) -> d
             project, _ = as_photographed(project, frozenset({"f_number"}))
         else:
             project = project.replace(coating=Everywhere(coating=Bare()))
-        name = Path(lens).stem
+        # names such as takumar-50-f1.4 have no suffix
+        name = Path(lens).stem if Path(lens).exists() else lens
         found[f"{name} {stop}, {size[0]}x{size[1]}, {work.name}, {where}"] = project
     return found
 
