@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +12,8 @@ from ...optics.diffraction.fft_size import fast_size
 from ...optics.pupil.polygon import END, START, WEIGHT, mapped, points
 from ...typing import Floats, Pixels
 from ..image.canvas import lit_window
+
+_Light = TypeVar("_Light", Pixels, Floats)
 
 # kernels of more taps are applied by a Fourier transform
 MOST_TAPS = 300
@@ -41,41 +45,6 @@ def blur_by_extent(picture: NDArray[np.floating], kernel: Floats) -> Floats:
     return out
 
 
-def spread_window(picture: Pixels, kernel: Floats) -> tuple[Pixels, tuple[int, int]]:
-    """Convolve a picture that is dark outside a small window, and remove a border as wide as the kernel reaches.
-
-    Parameters
-    ----------
-    picture : ndarray, shape (H + 2 a, W + 2 b, C), float32
-    kernel : ndarray, shape (2 a + 1, 2 b + 1)
-
-    Returns
-    -------
-    light : ndarray, shape (H', W', C), float32
-        The part of the result of H x W pixels that may hold light; empty where there is none.
-    corner : tuple of int
-        Column and row of its first pixel.
-    """
-    reach = [side // 2 for side in kernel.shape]
-    height, width = picture.shape[0] - 2 * reach[0], picture.shape[1] - 2 * reach[1]
-    x0, y0, x1, y1 = lit_window(picture)
-    # the convolved window, in the result without border
-    left, top = max(x0 - 2 * reach[1], 0), max(y0 - 2 * reach[0], 0)
-    right, bottom = min(x1, width), min(y1, height)
-    if x1 <= x0 or right <= left or bottom <= top:
-        return np.zeros((0, 0, picture.shape[2]), dtype=np.float32), (0, 0)
-    window = picture[y0:y1, x0:x1]
-    if np.count_nonzero(kernel) > MOST_TAPS:
-        wide = np.pad(window, ((reach[0],) * 2, (reach[1],) * 2, (0, 0)))
-        spread = blur_by_extent(wide, kernel).astype(np.float32)
-        cut_x, cut_y = left - (x0 - 2 * reach[1]), top - (y0 - 2 * reach[0])
-        return spread[cut_y : cut_y + bottom - top, cut_x : cut_x + right - left], (left, top)
-    light = np.zeros((bottom - top, right - left, picture.shape[2]), dtype=np.float32)
-    first = top - (y0 - 2 * reach[0]), left - (x0 - 2 * reach[1])
-    spread_taps(np.ascontiguousarray(window, dtype=np.float32), kernel.astype(np.float32), *first, light)
-    return light, (left, top)
-
-
 def spread_within(picture: NDArray[np.floating], kernel: Floats) -> Floats:
     """Convolve a picture that is dark outside a small window, and remove a border as wide as the kernel reaches.
 
@@ -88,19 +57,71 @@ def spread_within(picture: NDArray[np.floating], kernel: Floats) -> Floats:
     -------
     ndarray, shape (H, W, C)
     """
-    reach = [side // 2 for side in kernel.shape]
-    height, width = picture.shape[0] - 2 * reach[0], picture.shape[1] - 2 * reach[1]
-    out = np.zeros((height, width, picture.shape[2]))
+    lit, seen, corner = _landing(picture, kernel)
+    rows, columns = picture.shape[0] - kernel.shape[0] + 1, picture.shape[1] - kernel.shape[1] + 1
+    return placed(_transformed(picture[lit], kernel, seen), corner, (columns, rows))
+
+
+def spread_window(picture: Pixels, kernel: Floats) -> tuple[Pixels, tuple[int, int]]:
+    """As `spread_within`, but return only the part of the result that may hold light.
+
+    Parameters
+    ----------
+    picture : ndarray, shape (H + 2 a, W + 2 b, C), float32
+    kernel : ndarray, shape (2 a + 1, 2 b + 1)
+
+    Returns
+    -------
+    light : ndarray, shape (H', W', C), float32
+        Empty where there is no light.
+    corner : tuple of int
+        Column and row of its first pixel.
+    """
+    lit, seen, corner = _landing(picture, kernel)
+    if np.count_nonzero(kernel) > MOST_TAPS:
+        return _transformed(picture[lit], kernel, seen).astype(np.float32), corner
+    rows, columns = seen
+    light = np.zeros((rows.stop - rows.start, columns.stop - columns.start, picture.shape[2]), dtype=np.float32)
+    window = np.ascontiguousarray(picture[lit], dtype=np.float32)
+    spread_taps(window, kernel.astype(np.float32), rows.start, columns.start, light)
+    return light, corner
+
+
+def placed(light: _Light, corner: tuple[int, int], size_px: tuple[int, int]) -> _Light:
+    """Return a picture of width and height `size_px` with light at a corner, column and row, else dark."""
+    whole = np.zeros((size_px[1], size_px[0], light.shape[2]), dtype=light.dtype)
+    (x, y), (height, width) = corner, light.shape[:2]
+    whole[y : y + height, x : x + width] = light
+    return whole
+
+
+def _landing(
+    picture: NDArray[np.floating], kernel: Floats
+) -> tuple[tuple[slice, slice], tuple[slice, slice], tuple[int, int]]:
+    """Find where the light of a picture lands when it is spread.
+
+    Returns rows and columns of the picture with light; the rows and columns of their whole convolution that lie within
+    the picture without its border, empty if there are none; and the column and row there of the first of these.
+    """
     x0, y0, x1, y1 = lit_window(picture)
-    if x1 > x0:
-        window = np.pad(picture[y0:y1, x0:x1], ((reach[0],) * 2, (reach[1],) * 2, (0, 0)))
-        light = blur_by_extent(window, kernel)
-        # corner of the convolved window in the result without border
-        left, top = x0 - 2 * reach[1], y0 - 2 * reach[0]
-        cut_x, cut_y = max(0, -left), max(0, -top)
-        seen = light[cut_y : height - top, cut_x : width - left]
-        out[top + cut_y : top + cut_y + seen.shape[0], left + cut_x : left + cut_x + seen.shape[1]] = seen
-    return out
+    seen, corner = [], []
+    for start, end, side, taps in zip((y0, x0), (y1, x1), picture.shape, kernel.shape, strict=False):
+        # the convolution begins at this row or column of the result
+        first = start - taps + 1
+        low = max(first, 0)
+        seen.append(slice(low - first, max(min(end, side - taps + 1), low) - first))
+        corner.append(low)
+    if x1 <= x0 or any(part.stop <= part.start for part in seen):
+        seen, corner = [slice(0, 0)] * 2, [0, 0]
+    return (slice(y0, y1), slice(x0, x1)), (seen[0], seen[1]), (corner[1], corner[0])
+
+
+def _transformed(window: NDArray[np.floating], kernel: Floats, seen: tuple[slice, slice]) -> Floats:
+    """Return a part of the whole convolution of a window, by FFT."""
+    if seen[0].stop <= seen[0].start:
+        return np.zeros((0, 0, window.shape[2]))
+    around = [(side // 2,) * 2 for side in kernel.shape]
+    return blur_by_extent(np.pad(window, (*around, (0, 0))), kernel)[seen]
 
 
 def joined_parts(one: Floats, other: Floats) -> Floats:

@@ -36,7 +36,7 @@ from ..scene.path_color import traced_spectrum, visible_rays
 from ..scene.shot import Shot, at_fine_wavelengths
 from .art_filters import coarseness, filtered_ghost
 from .cost import IDLE, CostMeter, Watch
-from .extent_blur import shape_kernel, spread_window
+from .extent_blur import placed, shape_kernel, spread_window
 from .final_pass import FinalPass
 from .steep_ghosts import bent_spectrum, steepness
 from .wavelength_subset import gathered_weights
@@ -339,9 +339,9 @@ def _drawn_in_few(
     colors = shot.weights(shot.packed.wavelengths_nm, spectrum) * item.art.rgb
     seen = visible_rays(shot, item.to_pixels)
     weights = gathered_weights(shot.packed, bundle, shot.incidence.tilt, colors, shown, seen, careful=careful)
+    watch.lap("colour")
     if weights is None:
         return False
-    watch.lap("colour")
     for w, rgb in weights.items():
         whole, data = cut_failed_triangles(bundle, trace_bundle(shot.packed, w, bundle, shot.incidence.tilt))
         watch.lap("between")
@@ -461,9 +461,7 @@ def draw_alone(
         return
     if kernel is not None:
         # filters take the picture with its margin
-        whole = np.zeros((height + 2 * art_margin[1], width + 2 * art_margin[0], 3), dtype=np.float32)
-        whole[corner[1] : corner[1] + pixels.shape[0], corner[0] : corner[0] + pixels.shape[1]] = pixels
-        pixels = whole
+        pixels = placed(pixels, corner, (width + 2 * art_margin[0], height + 2 * art_margin[1]))
     canvas.add(filtered_ghost(pixels, art, frame, items[0].to_pixels / 2.0**detail, own), detail)
 
 
