@@ -36,7 +36,9 @@ def print_profile(profile: RenderProfile) -> None:
     if len(profile.ghosts) > _SHOWN:
         table.add_row(f"{len(profile.ghosts) - _SHOWN} others", *_numbers(profile.ghosts[_SHOWN:]))
     table.add_row("all", *_numbers(profile.ghosts))
-    console = Console(stderr=True, markup=False, highlight=False, width=None if Console().is_terminal else 160)
+    console = Console(stderr=True, markup=False, highlight=False)
+    if not console.is_terminal:
+        console.width = 160
     console.print(table)
     halved: Counter[str] = Counter()
     for cost in profile.ghosts:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from time import thread_time
 from typing import Any
@@ -115,6 +115,8 @@ class Watch:
         if bundle.halved is not None:
             for reason, count in zip(REASONS, bundle.halved, strict=True):
                 self.halved[reason] += int(count)
+        # counting is no part of the work
+        self._last = thread_time()
 
     def traced(self, bundle: Bundle, wavelengths: int) -> None:
         """Count the rays of the wavelengths that the grid lacks."""
@@ -217,19 +219,22 @@ def _cells(bundle: Bundle) -> int:
     return int(np.count_nonzero(np.diff(centres)) + 1) if len(centres) else 0
 
 
-def _cost(path: str, watches: Iterable[Watch]) -> GhostCost:
+def _cost(path: str, watches: Sequence[Watch]) -> GhostCost:
+    """Add the watches of one path."""
     seconds: dict[str, float] = defaultdict(float)
-    halved: dict[str, int] = defaultdict(int)
-    counts = np.zeros(5)
-    detail = 0
+    halved: Counter[str] = Counter()
     for watch in watches:
+        halved.update(watch.halved)
         for stage, spent in watch.seconds.items():
             seconds[stage] += spent
-        for reason, count in watch.halved.items():
-            halved[reason] += count
-        counts += watch.rays, watch.cells, watch.drawings, watch.triangles, watch.fragments
-        detail = max(detail, watch.detail)
-    rays, cells, drawings, triangles = (int(count) for count in counts[:4])
     return GhostCost(
-        path, dict(seconds), rays, cells, drawings, triangles, float(counts[4]), detail, dict(halved)
-    )  # fmt: skip
+        path,
+        dict(seconds),
+        rays=sum(watch.rays for watch in watches),
+        cells=sum(watch.cells for watch in watches),
+        drawings=sum(watch.drawings for watch in watches),
+        triangles=sum(watch.triangles for watch in watches),
+        fragments=sum(watch.fragments for watch in watches),
+        detail=max(watch.detail for watch in watches),
+        halved=dict(halved),
+    )

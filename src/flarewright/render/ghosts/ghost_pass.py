@@ -192,10 +192,10 @@ def _final(
     def find(group: list[LightPath]) -> list[list[FinalPass]]:
         if meter.cancelled.is_set():
             return []
-        begun = thread_time()
+        started = thread_time()
         found = look(group)
         if costs is not None:
-            costs.searched(thread_time() - begun)
+            costs.searched(thread_time() - started)
         for _ in group:
             meter.step("searching ghosts")
         return found

@@ -247,7 +247,6 @@ def _curve(
     steep = steep_gaps(shot, between.fine_nm, throughput, spectra)
     for k in np.flatnonzero(steep.any(axis=1)).tolist():
         own, steps = [paths[k]], squares[_steps_of(paths, np.array([k]))]
-
         more = within_gaps(between.fine_nm, steep[k])
         flux, angles = matrix_fluxes(shot, own, n_gap[more], fine.reflectance, nearest[more], RIM)
         curve[k, more] = over(flux, _carried(bands, own, steps, angles, nearest[more]))[0]
@@ -256,7 +255,6 @@ def _curve(
         for gaps, bright, dark in zip(ends(at_curve, ABRUPT_PART), (1, 0), (0, 1), strict=True):
             for m in np.flatnonzero(gaps[0]).tolist():
                 low, high = m + bright, m + dark
-
                 at = partial(_flux_between, shot, own, n_gap[low], n_gap[high], nearest[[low]])
                 # relative to the bright bound, because rays carry nearly the same within a gap
                 bright_flux = at(0.0)
@@ -384,11 +382,6 @@ def _arguments(shot: Shot) -> tuple[MeridianLens, EntranceLight, Floats]:
         axes = np.eye(2)
     lens = MeridianLens(packed.curvature, packed.z_vertex, packed.n_gap, packed.reflectance, packed.sensor_z)
     return lens, EntranceLight(float(packed.semi[packed.first_surface]), slope, slope_x, nearness), axes
-
-
-def _at_wavelength(lens: MeridianLens, w: int) -> MeridianLens:
-    """Return a lens at one of its wavelengths."""
-    return lens._replace(n_gap=lens.n_gap[w], reflectance=lens.reflectance[w])
 
 
 def _outline(shot: Shot) -> StopOutline:
