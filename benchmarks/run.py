@@ -471,14 +471,19 @@ def show(rows: Rows) -> None:
             print(f"\n{part}")
         ratio = f"  {r['ratio']:6.2f} x {r['against']}" if r["ratio"] is not None else ""
         before = r.get("before")
-        change = "" if not before else f"  {(r['ratio'] or r['value']) / before:5.2f} of before"
+        change = "" if not before else f"  {_compared(r) / before:5.2f} of before"
         print(f"  {r['name']:<{width}}  {r['value']:10.4g} {r['unit']}{ratio}{change}")
 
 
+def _compared(r: dict[str, Any]) -> float:
+    """Return the number of a row that machines can compare: its ratio, or its value where it has none."""
+    return float(r["ratio"] or r["value"])
+
+
 def _before(now: dict[str, Any], rows: Rows) -> float | None:
-    """Return the ratio of the same row of an earlier run, or its value where it has no ratio."""
+    """Return the compared number of the same row of an earlier run."""
     same = [r for r in rows if (r["part"], r["name"], r["against"]) == (now["part"], now["name"], now["against"])]
-    return next((r["ratio"] or r["value"] for r in same), None)
+    return next((_compared(r) for r in same), None)
 
 
 def _size(text: str) -> tuple[int, int]:

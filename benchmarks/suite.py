@@ -61,8 +61,23 @@ class Work:
 WORKS = (Work("3 wavelengths", 3, "off"), Work("with rings", 3, "collins"), Work("defaults", 7, "collins", True))
 
 
-def frames(lens: str, size: tuple[int, int], works: Sequence[Work] = WORKS) -> dict[str, Project]:
-    """Return the frames of a lens by name: wide open and stopped down, the light inside and outside the picture.
+@dataclass(frozen=True)
+class Frame:
+    """One frame of the suite: lens, opening and place of the light; how it is drawn; and its project."""
+
+    name: str
+    work: Work
+    project: Project
+
+    @property
+    def label(self) -> str:
+        """Name of its rows."""
+        lens, where = self.name.split(", ")
+        return f"{lens}, {_by(self.project.camera.size_px)}, {self.work.name}, {where}"
+
+
+def frames(lens: str, size: tuple[int, int]) -> list[Frame]:
+    """Return the frames of a lens: wide open and stopped down, the light inside and outside the picture.
 
     Parameters
     ----------
@@ -70,13 +85,12 @@ def frames(lens: str, size: tuple[int, int], works: Sequence[Work] = WORKS) -> d
         Name or file.
     size : tuple of int
         Pixels.
-    works : sequence of Work
 
     Returns
     -------
-    dict of str to Project
+    list of Frame
     """
-    found = {}
+    found = []
     opened = open_lens(lens).lens
     plain = Project(lens=lens, lights=(Light(field_deg=(5.0, 2.5)),), camera=Camera(size_px=size))
     order = resolve_project(plain).order
@@ -84,7 +98,7 @@ def frames(lens: str, size: tuple[int, int], works: Sequence[Work] = WORKS) -> d
     half_mm = 0.5 * (width**2 + height**2) ** 0.5
     widest = opened.f_number if opened.f_number is not None else order.f_number
     for work, (stop, f_number), (where, part) in product(
-        works,
+        WORKS,
         (("open", widest), (f"f/{STOPPED:g}", STOPPED)),
         (("light inside", INSIDE), ("light outside", OUTSIDE)),
     ):
@@ -103,8 +117,12 @@ def frames(lens: str, size: tuple[int, int], works: Sequence[Work] = WORKS) -> d
             project = project.replace(coating=Everywhere(coating=Bare()))
         # names such as takumar-50-f1.4 have no suffix
         name = Path(lens).stem if Path(lens).exists() else lens
-        found[f"{name} {stop}, {size[0]}x{size[1]}, {work.name}, {where}"] = project
+        found.append(Frame(f"{name} {stop}, {where}", work, project))
     return found
+
+
+def _by(size: tuple[int, int]) -> str:
+    return f"{size[0]}x{size[1]}"
 
 
 def _field(slope: float) -> tuple[float, float]:
@@ -135,31 +153,29 @@ def suite(
     list of dict
         Wall clock and processor time of every frame, then the slowest frame against the median, by work and size.
     """
-    works = {}
-    for size, lens in product(sizes, (*LENSES, *lenses)):
-        works |= frames(lens, size)
-    wall: dict[str, list[float]] = {name: [] for name in works}
-    spent: dict[str, list[float]] = {name: [] for name in works}
+    drawn = [frame for size, lens in product(sizes, (*LENSES, *lenses)) for frame in frames(lens, size)]
+    wall: list[list[float]] = [[] for _ in drawn]
+    spent: list[list[float]] = [[] for _ in drawn]
     for turn in range(repeat + 1):
-        for name, project in works.items():
-            begun, used = time.perf_counter(), time.process_time()
-            render(project, threads=os.cpu_count())
+        for k, frame in enumerate(drawn):
+            started, used = time.perf_counter(), time.process_time()
+            render(frame.project, threads=os.cpu_count())
             if turn:
-                wall[name].append(time.perf_counter() - begun)
-                spent[name].append(time.process_time() - used)
+                wall[k].append(time.perf_counter() - started)
+                spent[k].append(time.process_time() - used)
     found = []
-    medians = {name: statistics.median(times) for name, times in spent.items()}
-    for name in works:
-        found.append(row("suite", name, 1e3 * statistics.median(wall[name]), "ms"))
-        found.append(
-            row("suite", f"{name}, CPU", 1e3 * medians[name], "ms", medians[name] * scalar / 1e6, "M ray-surfaces")
-        )
+    medians = [statistics.median(times) for times in spent]
+    for frame, times, used in zip(drawn, wall, medians, strict=True):
+        found.append(row("suite", frame.label, 1e3 * statistics.median(times), "ms"))
+        found.append(row("suite", f"{frame.label}, CPU", 1e3 * used, "ms", used * scalar / 1e6, "M ray-surfaces"))
     for size, work in product(sizes, WORKS):
-        alike = {name: used for name, used in medians.items() if f"{size[0]}x{size[1]}, {work.name}," in name}
-        worst = max(alike, key=lambda name: alike[name])
-        middle = statistics.median(alike.values())
-        found.append(
-            row("suite", f"slowest of {size[0]}x{size[1]}, {work.name}: {worst.split(',')[0]}", 1e3 * alike[worst],
-                "ms", alike[worst] / middle, "median")
-        )  # fmt: skip
+        alike = [
+            (used, frame)
+            for used, frame in zip(medians, drawn, strict=True)
+            if frame.work == work and frame.project.camera.size_px == size
+        ]
+        worst, slowest = max(alike, key=lambda pair: pair[0])
+        middle = statistics.median(used for used, _ in alike)
+        name = f"slowest of {_by(size)}, {work.name}: {slowest.name}"
+        found.append(row("suite", name, 1e3 * worst, "ms", worst / middle, "median"))
     return found

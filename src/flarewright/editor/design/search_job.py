@@ -236,9 +236,9 @@ class Solver:
             return
         ready.set()
         looked, stored, file = 0.0, time.perf_counter(), kept_search(project)
-        begun = read_kept(file) or PoolState(0)
-        if begun.searches:
-            self._report(True, f"Resuming a search of {count(begun.searches, 'try', 'tries')}", begun.seconds, ())
+        earlier = read_kept(file) or PoolState(0)
+        if earlier.searches:
+            self._report(True, f"Resuming a search of {count(earlier.searches, 'try', 'tries')}", earlier.seconds, ())
 
         def look(state: PoolState) -> None:
             nonlocal looked, stored
@@ -257,8 +257,8 @@ class Solver:
         finished = replace(problem, traced=problem.traced or scratch)
         rest = FINISHING * seconds if finished.traced else 0.0
         # a resumed search has the rest of its time
-        limit = max(seconds - rest - begun.seconds, 0.0)
-        state = solve(problem, time_limit=limit, progress=look, cancelled=stop.is_set, state=begun)
+        limit = max(seconds - rest - earlier.seconds, 0.0)
+        state = solve(problem, time_limit=limit, progress=look, cancelled=stop.is_set, state=earlier)
         if self._closing:
             self._keep(file, state)
             return
