@@ -30,7 +30,10 @@ import numpy as np
 from benchmarks.design import design
 from benchmarks.lights import area, lights, surfaces
 from benchmarks.passes import passes
+from benchmarks.scaling import scaling
+from benchmarks.small import RATIOS, lost, small
 from benchmarks.suite import SIZES, suite
+from benchmarks.yardstick import RAY_SURFACES, trace_plainly
 
 import flarewright
 from flarewright.kernels.raster.polygons import blank_plane, fill_polygon
@@ -64,7 +67,7 @@ from flarewright.render.scene.shots import make_shots
 
 PARTS = (
     "yardsticks", "trace", "raster", "frame", "passes", "art", "built", "lights", "area", "surfaces", "scatter",
-    "ringing", "reference", "design", "residual", "startup", "memory", "suite",
+    "ringing", "reference", "design", "residual", "startup", "memory", "small", "scaling", "suite",
 )  # fmt: skip
 
 LIGHT = (10.0, 5.0)
@@ -100,39 +103,13 @@ def row(part: str, name: str, value: float, unit: str, ratio: float | None = Non
 # --- yardsticks
 
 
-@numba.njit(error_model="numpy")
-def _scalar_trace(curvature, gap, index, heights):
-    """Trace meridional rays one after the other, with refraction at spheres, in plain scalar code."""
-    total = 0.0
-    for y0 in heights:
-        y, z, dy, dz = y0, 0.0, 0.0, 1.0
-        for k in range(curvature.size):
-            c = curvature[k]
-            b = c * (y * dy + z * dz) - dz
-            q = c * (y * y + z * z) - 2.0 * z
-            root = sqrt(max(b * b - c * q, 0.0))
-            t = q / (root - b)
-            y, z = y + t * dy, z + t * dz
-            eta = index[k] / index[k + 1]
-            along = eta * root - sqrt(max(1.0 - eta * eta * (1.0 - root * root), 0.0))
-            dy, dz = eta * dy + along * c * y, eta * dz + along * (c * z - 1.0)
-            z -= gap[k]
-        total += y
-    return total
-
-
 def yardsticks(repeat: int) -> tuple[Rows, float, float]:
     """Return the rows, bytes copied per second, and scalar ray-surfaces per second, both on one core."""
     source = np.ones(8_000_000)
     target = np.empty_like(source)
     seconds = median_seconds(lambda: np.copyto(target, source), repeat, 0.2)
     bandwidth = 2.0 * source.nbytes / seconds
-    curvature = np.array([0.03, -0.01, 0.002, -0.012, 0.035, 0.0, 0.031, -0.019])
-    index = np.array([1.0, 1.65, 1.6, 1.0, 1.64, 1.0, 1.58, 1.69, 1.0])
-    heights = np.linspace(-5.0, 5.0, 200_000)
-    gap = np.full(8, 4.0)
-    seconds = median_seconds(lambda: _scalar_trace(curvature, gap, index, heights), repeat, 0.2)
-    scalar = heights.size * curvature.size / seconds
+    scalar = RAY_SURFACES / median_seconds(trace_plainly, repeat, 0.2)
     rows = [
         row("yardsticks", "copy of memory", bandwidth / 1e9, "GB/s"),
         row("yardsticks", "plain scalar tracer, one core", scalar / 1e6, "M ray-surfaces/s"),
@@ -497,11 +474,18 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--json", metavar="FILE", help="write the numbers to this file")
     parser.add_argument("--repeat", type=int, default=5, help="runs per number; the median is printed (default: 5)")
     parser.add_argument(
-        "--only", nargs="+", choices=PARTS, default=PARTS[:-1], help="parts to run (default: all but the long suite)"
+        "--only",
+        nargs="+",
+        choices=PARTS,
+        default=PARTS[:-2],
+        help="parts to run (default: all but the long scaling and suite)",
     )
     parser.add_argument("--lens", nargs="+", default=[], metavar="FILE", help="more lenses for the suite")
     parser.add_argument("--size", nargs="+", type=_size, default=SIZES, metavar="WxH", help="frames of the suite")
     parser.add_argument("--baseline", metavar="FILE", help="numbers of an earlier --json to print beside these")
+    parser.add_argument(
+        "--worst", type=float, metavar="FACTOR", help="end with 1 if one of the small works lost more than this factor"
+    )
     given = parser.parse_args(arguments)
     machine = facts()
     print("  ".join(f"{key} {value}" for key, value in machine.items()))
@@ -524,6 +508,8 @@ def main(arguments: list[str] | None = None) -> None:
         "residual": residual,
         "startup": lambda: startup(given.repeat),
         "memory": memory,
+        "small": lambda: small(row, given.repeat),
+        "scaling": lambda: scaling(row, os.cpu_count() or 1),
         "suite": lambda: suite(row, scalar, given.repeat, given.lens, given.size),
     }
     for part in PARTS:
@@ -532,11 +518,17 @@ def main(arguments: list[str] | None = None) -> None:
     if given.baseline:
         before = json.loads(Path(given.baseline).read_text(encoding="utf-8"))["results"]
         rows = [{**r, "before": _before(r, before)} for r in rows]
+    kept = json.loads(RATIOS.read_text(encoding="utf-8"))["ratios"] if RATIOS.exists() else {}
+    rows = [{**r, "before": kept.get(r["name"])} if r["part"] == "small" else r for r in rows]
     show(rows)
     if given.json:
         Path(given.json).write_text(
             json.dumps({"machine": machine, "results": rows}, indent=2) + "\n", encoding="utf-8"
         )
+    if given.worst is not None:
+        losses = lost({r["name"]: r["ratio"] for r in rows if r["part"] == "small"}, kept, given.worst)
+        print("\n".join(losses) or f"no small work lost more than a factor of {given.worst:g}")
+        sys.exit(1 if losses else 0)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,44 @@
+"""The comparison of the small benchmarks with the kept ratios fails where it should; it measures no time."""
+
+import json
+
+import pytest
+from benchmarks.small import MACHINES_DIFFER, RATIOS, lost, works
+from benchmarks.yardstick import RAY_SURFACES, trace_plainly
+
+KEPT = {"trace": 2.0, "fill": 10.0, "rings": 0.5}
+
+
+@pytest.mark.parametrize("common", [0.4, 1.0, 2.9])
+def test_a_machine_with_other_ratios_loses_nothing(common: float) -> None:
+    assert lost({name: common * ratio for name, ratio in KEPT.items()}, KEPT, 1.5) == []
+
+
+@pytest.mark.parametrize("common", [0.4, 1.0, 2.9])
+def test_one_slower_work_is_named(common: float) -> None:
+    now = {name: common * ratio for name, ratio in KEPT.items()}
+    now["fill"] *= 1.6
+    [sentence] = lost(now, KEPT, 1.5)
+    assert sentence.startswith("fill: 1.60 times")
+    now["fill"] *= 1.4 / 1.6
+    assert lost(now, KEPT, 1.5) == []
+
+
+def test_a_loss_of_all_works_is_told() -> None:
+    [sentence] = lost({name: 1.1 * MACHINES_DIFFER * ratio for name, ratio in KEPT.items()}, KEPT, 1.5)
+    assert sentence.startswith("all works")
+
+
+def test_works_without_a_kept_ratio_are_told() -> None:
+    assert lost({**KEPT, "new": 1.0}, KEPT, 1.5) == ["new: no ratio is kept; run python -m benchmarks.small"]
+    assert len(lost({}, KEPT, 1.5)) == 1
+
+
+def test_every_work_has_a_kept_ratio() -> None:
+    assert set(json.loads(RATIOS.read_text(encoding="utf-8"))["ratios"]) == set(works())
+
+
+def test_the_yardstick_traces_what_it_counts() -> None:
+    assert RAY_SURFACES == 200_000 * 8
+    # symmetric heights: the sum of the places is 0 but for rounding
+    assert abs(trace_plainly()) < 1e-6
