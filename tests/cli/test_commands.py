@@ -262,12 +262,23 @@ def test_turning_the_blades_keeps_the_lens_own_number(capsys, projects):
     assert projects[1].coating == Preset(name="thesis")
 
 
+def _caused_by(error, cause):
+    """Return what llvmlite raises when it finds no memory for its library."""
+    error.__cause__ = cause
+    return error
+
+
 @pytest.mark.parametrize(
     ("error", "code", "words"),
     [
         (KeyboardInterrupt(), 130, "flarewright: interrupted; nothing was left half-written"),
         (MemoryError(), 2, "flarewright: error: there is not enough memory"),
         (ImportError("x.so: failed to map segment from shared object"), 2, "flarewright: error: there is not enough m"),
+        (
+            _caused_by(OSError("library not found"), OSError("x.so: failed to map segment")),
+            2,
+            "flarewright: error: there is",
+        ),
         (RuntimeError("can't start new thread"), 2, "flarewright: error: there is not enough memory"),
         (OSError(28, "No space left on device"), 2, "flarewright: error: No space left on device"),
     ],

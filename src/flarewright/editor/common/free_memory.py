@@ -1,7 +1,7 @@
 """Give memory that the C library holds free back to the system.
 
-Threads of pools allocate in up to eight arenas a core. Each arena holds what pictures have freed, up to the most that it
-ever had, and no other arena can use it. So the memory of an editor grows for hours although its data do not.
+Threads of pools allocate in up to eight arenas a core. Each arena holds what pictures have freed, up to the most that
+it ever had, and no other arena can use it. So the memory of an editor grows for hours although its data do not.
 """
 
 from __future__ import annotations
