@@ -322,6 +322,7 @@ def test_an_unexpected_end_of_a_file_is_no_interruption(monkeypatch):
         ("measure replay model.json --constellation 3 -o a.exr", False),
         ("predict heliar-tronnier -o page.html", True),
         ("predict heliar-tronnier -o page.html --glare", True),
+        ("predict heliar-tronnier", True),
         ("predict heliar-tronnier --cache=kept.npz --glare", True),
         ("render heliar-tronnier --light 1,1 -o a.exr", False),
     ],
@@ -341,8 +342,8 @@ def test_ctrl_c_reports_the_flag_that_a_command_lacked_to_resume(capsys, monkeyp
         raise KeyboardInterrupt
 
     monkeypatch.setattr("flarewright.cli.app.app", stopped)
-    assert run(["predict", "heliar-tronnier"]) == 130
-    assert capsys.readouterr().err.endswith("; with --output or --cache the same command would resume\n")
+    assert run(["design", "benchmark", "heliar"]) == 130
+    assert capsys.readouterr().err.endswith("; with --report or --picture the same command would resume\n")
 
 
 def test_a_real_draft_render(capsys, folder):

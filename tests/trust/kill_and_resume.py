@@ -184,6 +184,10 @@ TRIALS = {
          "--json"),
         ("out.html",), output=str,
     ),
+    "predict --json": Trial(
+        ("predict", "heliar-tronnier", "--fstop", "16", "--quality", "draft", "--samples", "9", "--json"),
+        ("state/partial/*",), output=str,
+    ),
     "render --quality final": Trial(
         ("render", "canon-28-80", "--light", "10,5", "--light", "-4,3", "--quality", "final", "--size", "480x270",
          "--orders", "4", "--no-png", "-o", "out.exr"),
@@ -315,6 +319,7 @@ def _run(folder: Path, words: tuple[str, ...]) -> tuple[int, str, str]:
 def _started(folder: Path, words: tuple[str, ...]) -> subprocess.Popen[str]:
     # the same sources from another folder
     environment = {**os.environ, "PYTHONPATH": str(Path(flarewright.__file__).parents[1])}
+    environment["FLAREWRIGHT_STATE"] = str(folder / "state")
     if words == ("warm-up",):
         environment["NUMBA_CACHE_DIR"] = str(folder / "cache")
     return subprocess.Popen(

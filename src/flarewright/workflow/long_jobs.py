@@ -51,7 +51,7 @@ JOBS = (
     LongJob(("measure", "track"), "DIR/track.journal"),
     LongJob(("measure", "compress"), "DIR/compress.journal"),
     LongJob(("measure", "explain"), "DIR/search.json"),
-    LongJob(("predict",), "NAME.partial.npz", needs=("--output", "-o", "--cache")),
+    LongJob(("predict",), "NAME.partial.npz"),
     LongJob(("render",), "NAME.partial, NAME.state.npz", "the same command, or --resume NAME.state.npz"),
     LongJob(("gallery",), "DIR/gallery.json"),
     LongJob(("warm-up",), "the cache of compiled kernels"),
