@@ -262,12 +262,23 @@ def test_turning_the_blades_keeps_the_lens_own_number(capsys, projects):
     assert projects[1].coating == Preset(name="thesis")
 
 
+def _caused_by(error, cause):
+    """Return what llvmlite raises when it finds no memory for its library."""
+    error.__cause__ = cause
+    return error
+
+
 @pytest.mark.parametrize(
     ("error", "code", "words"),
     [
         (KeyboardInterrupt(), 130, "flarewright: interrupted; nothing was left half-written"),
         (MemoryError(), 2, "flarewright: error: there is not enough memory"),
         (ImportError("x.so: failed to map segment from shared object"), 2, "flarewright: error: there is not enough m"),
+        (
+            _caused_by(OSError("library not found"), OSError("x.so: failed to map segment")),
+            2,
+            "flarewright: error: there is",
+        ),
         (RuntimeError("can't start new thread"), 2, "flarewright: error: there is not enough memory"),
         (OSError(28, "No space left on device"), 2, "flarewright: error: No space left on device"),
     ],
@@ -311,6 +322,7 @@ def test_an_unexpected_end_of_a_file_is_no_interruption(monkeypatch):
         ("measure replay model.json --constellation 3 -o a.exr", False),
         ("predict heliar-tronnier -o page.html", True),
         ("predict heliar-tronnier -o page.html --glare", True),
+        ("predict heliar-tronnier", True),
         ("predict heliar-tronnier --cache=kept.npz --glare", True),
         ("render heliar-tronnier --light 1,1 -o a.exr", False),
     ],
@@ -330,8 +342,8 @@ def test_ctrl_c_reports_the_flag_that_a_command_lacked_to_resume(capsys, monkeyp
         raise KeyboardInterrupt
 
     monkeypatch.setattr("flarewright.cli.app.app", stopped)
-    assert run(["predict", "heliar-tronnier"]) == 130
-    assert capsys.readouterr().err.endswith("; with --output or --cache the same command would resume\n")
+    assert run(["design", "benchmark", "heliar"]) == 130
+    assert capsys.readouterr().err.endswith("; with --report or --picture the same command would resume\n")
 
 
 def test_a_real_draft_render(capsys, folder):

@@ -2,6 +2,9 @@
 
 import errno
 import json
+import os
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -719,6 +722,44 @@ def test_a_lane_outlives_a_job_that_fails(capsys):
     assert ran == ["next"]
     assert "ours" in capsys.readouterr().err
     lane.close()
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        "from flarewright.editor.common.latest_job import Lane; Lane('test').submit(work)",
+        "from flarewright.editor.design.search_job import Solver; from flarewright.editor.session.session import begin;"
+        "Solver(begin('heliar-tronnier')[0], None)._begin(work)",
+    ],
+    ids=["lane", "solver"],
+)
+def test_a_process_that_ends_while_a_job_submits_work_prints_nothing(start, tmp_path):
+    text = f"""
+import threading, time
+from concurrent.futures import ThreadPoolExecutor
+
+began, failed = threading.Event(), threading.Event()
+
+def work(*_):
+    began.set()
+    while True:
+        try:
+            with ThreadPoolExecutor(1) as pool:
+                pool.submit(int)
+        except RuntimeError:
+            failed.set()
+            raise
+
+{start}
+began.wait()
+# the interpreter waits for this worker after it has closed all pools
+ThreadPoolExecutor(1).submit(lambda: (failed.wait(10.0), time.sleep(0.2), print("refused" if failed.is_set() else "")))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", text], capture_output=True, text=True, timeout=120, check=False,
+        env={**os.environ, "FLAREWRIGHT_STATE": str(tmp_path)},
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (0, "refused\n", "")
 
 
 def test_a_lens_named_on_the_command_line_has_a_separate_autosave():

@@ -13,7 +13,7 @@ from flarewright.model import Camera, Light, Output, Project, Quality
 from flarewright.optics.colour.rgb import luminance_weights
 from flarewright.predict import table
 from flarewright.predict.curves import Curves, interpolated_statistics
-from flarewright.predict.flare import fingerprint_of
+from flarewright.predict.flare import Flare, fingerprint_of
 from flarewright.predict.lens_flare import square_flare, statistics_quality
 from flarewright.predict.plan import rounded_distance
 from flarewright.predict.table import FlareTable
@@ -151,3 +151,40 @@ def test_a_given_cache_stays_and_nothing_is_kept_without_output(tmp_path):
     with remembered(None, None) as memory:
         assert memory == {}
     assert sorted(path.name for path in tmp_path.iterdir()) == ["c.npz"]
+
+
+def test_a_prediction_without_output_resumes_from_the_state_folder_with_its_checks(tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("FLAREWRIGHT_STATE", str(tmp_path))
+    arguments = ["predict", "heliar-tronnier", "--fstop", "16", "--quality", "draft", "--samples", "5", "--check", "2"]
+    drawn, real = [], Flare.picture
+
+    def run_until(most):
+        def picture(self, *angles):
+            if len(drawn) == most:
+                raise KeyboardInterrupt
+            drawn.append(angles)
+            return real(self, *angles)
+
+        drawn.clear()
+        monkeypatch.setattr(Flare, "picture", picture)
+        return run([*arguments, "--json"]), capsys.readouterr()
+
+    code, whole = run_until(-1)
+    every = len(drawn)
+    assert code == 0
+    assert every == 7
+    assert list((tmp_path / "partial").iterdir()) == []
+    code, reported = run_until(every - 1)
+    assert code == 130
+    assert "the same command resumes" in reported.err
+    (kept,) = (tmp_path / "partial").iterdir()
+    # another command has another file
+    assert run([*arguments, "--roll", "1", "--json"]) == 130
+    assert kept.is_file()
+    capsys.readouterr()
+    code, reported = run_until(-1)
+    assert code == 0
+    assert len(drawn) == 1
+    assert "resuming with 6 pictures" in reported.err
+    assert reported.out == whole.out
+    assert not kept.exists()

@@ -33,8 +33,10 @@ import sys
 from flarewright.cli import common
 common.CHECKPOINT_S = 0.05
 if sys.argv[1] == "render":
+    from flarewright.render.image import partial_picture
     from flarewright.render.reference import estimator
-    estimator.SAVE_EVERY_S = 0.05
+    estimator.SAVE_EVERY_S = partial_picture.CHECKPOINT_S = 0.05
+    partial_picture.WRITING = 1.0
 from flarewright.cli.app import main
 main()
 """
@@ -182,7 +184,16 @@ TRIALS = {
          "--json"),
         ("out.html",), output=str,
     ),
-    "render": Trial(
+    "predict --json": Trial(
+        ("predict", "heliar-tronnier", "--fstop", "16", "--quality", "draft", "--samples", "9", "--json"),
+        ("state/partial/*",), output=str,
+    ),
+    "render --quality final": Trial(
+        ("render", "canon-28-80", "--light", "10,5", "--light", "-4,3", "--quality", "final", "--size", "480x270",
+         "--orders", "4", "--no-png", "-o", "out.exr"),
+        ("out.exr", "out.partial/*"),
+    ),
+    "render --quality reference": Trial(
         ("render", "heliar-tronnier", "--light", "10,5", "--quality", "reference", "--samples", "200000", "--error",
          "0.0001", "--size", "96x64", "--no-png", "-o", "out.exr"),
         ("out.exr",), ("render", "--resume", "out.state.npz", "--samples", "200000", "--error", "0.0001", "--no-png",
@@ -191,7 +202,7 @@ TRIALS = {
     "gallery": Trial(("gallery", "-o", "out", "--size", "32x18"), ("out/*.png", "out/index.html")),
     "warm-up": Trial(("warm-up",), ("cache/*/*.nbi",)),
 }  # fmt: skip
-"""One tiny job for every entry of `flarewright.workflow.long_jobs.JOBS`, by its words."""
+"""One tiny job for every entry of `flarewright.workflow.long_jobs.JOBS`, by its words; `render` has two."""
 
 
 # minutes each on a busy machine: the kind `stages` of the rig
@@ -308,6 +319,7 @@ def _run(folder: Path, words: tuple[str, ...]) -> tuple[int, str, str]:
 def _started(folder: Path, words: tuple[str, ...]) -> subprocess.Popen[str]:
     # the same sources from another folder
     environment = {**os.environ, "PYTHONPATH": str(Path(flarewright.__file__).parents[1])}
+    environment["FLAREWRIGHT_STATE"] = str(folder / "state")
     if words == ("warm-up",):
         environment["NUMBA_CACHE_DIR"] = str(folder / "cache")
     return subprocess.Popen(

@@ -77,6 +77,8 @@ def memory(seed: int) -> Verdict:
         if code == 2 or large:
             errors = [line for line in said.splitlines() if line.startswith(ERROR)]
             held = code == 2 and len(errors) == 1 and len(errors[0]) < LONGEST and not (out or whole or left)
+            # the cause that it names is the memory
+            held = held and "memory" in errors[0]
             return Verdict("memory", subject, held, f"exit code {code}: {said[-300:]}")
         if out or whole:
             return Verdict("memory", subject, False, f"exit code {code}, and a result")

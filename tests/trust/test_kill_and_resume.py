@@ -25,7 +25,7 @@ def test_every_command_is_in_the_list_or_short():
 
 
 def test_every_long_job_is_killed_by_the_rig_and_documented():
-    assert {" ".join(job.words) for job in JOBS} == set(TRIALS)
+    assert {" ".join(job.words) for job in JOBS} == {name.partition(" --")[0] for name in TRIALS}
     page = (Path(__file__).parents[2] / "docs" / "cli.md").read_text("utf-8")
     for job in JOBS:
         for file in job.keeps.split(", "):
@@ -38,7 +38,7 @@ def test_every_long_job_is_killed_by_the_rig_and_documented():
         ("measure run captures.csv -o run", True),
         ("predict heliar-tronnier --output=a.html", True),
         ("predict heliar-tronnier --cache a.npz", True),
-        ("predict heliar-tronnier", False),
+        ("predict heliar-tronnier", True),
         ("design benchmark heliar --report a.html", True),
         ("design benchmark heliar", False),
     ],

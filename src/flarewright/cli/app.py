@@ -236,6 +236,8 @@ def _call(words: list[str]) -> int:
     except BrokenPipeError:
         raise
     except OSError as error:
+        if _lacks_memory(error):
+            return _fail(_no_memory(words))
         where = f"{str(error.filename)[:200]}: " if error.filename else ""
         return _fail(f"{where}{error.strerror or error}")
     except SystemExit as end:
@@ -247,7 +249,7 @@ def _call(words: list[str]) -> int:
         # Usage errors come from Typer's copy of click or from click itself, by version; both have a message.
         if hasattr(error, "format_message"):
             return _fail(_usage(error))
-        if any(sign in str(error).lower() for sign in _NO_MEMORY) and isinstance(error, ImportError | RuntimeError):
+        if isinstance(error, ImportError | RuntimeError) and _lacks_memory(error):
             return _fail(_no_memory(words))
         if not swallowed:
             raise
@@ -285,6 +287,15 @@ def _resuming(words: Sequence[str]) -> str:
     if job.kept(words):
         return ", and the same command resumes"
     return f"; with {job.needs[0]} or {job.needs[-1]} the same command would resume"
+
+
+def _lacks_memory(error: BaseException | None) -> bool:
+    """Return whether an error, or what caused it, is a lack of memory: llvmlite reports a missing file instead."""
+    while error is not None:
+        if any(sign in str(error).lower() for sign in _NO_MEMORY):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def _no_memory(words: Sequence[str]) -> str:

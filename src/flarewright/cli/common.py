@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from threading import Event, Thread
@@ -212,7 +213,7 @@ def write_text(output: Path, text: str) -> None:
 
 
 @contextmanager
-def remembered(cache: Path | None, output: Path | None = None) -> Iterator[dict[str, Any]]:
+def remembered(cache: Path | None, output: Path | None = None, unnamed: str = "") -> Iterator[dict[str, Any]]:
     """Load pictures of earlier runs from a file, and store them with new ones every 10 s and at the end of the block.
 
     A cache that is damaged or cannot be written does not end the run.
@@ -223,12 +224,11 @@ def remembered(cache: Path | None, output: Path | None = None) -> Iterator[dict[
         File of the pictures. None: they are stored beside the output (NAME.partial.npz) for a run that resumes after
         an interruption; the end of the block deletes that file.
     output : path or None
+        None: they are stored in the state folder.
+    unnamed : str
+        Identifies the command, so that the same one finds them there.
     """
-    partial = None if output is None else output.with_suffix(".partial.npz")
-    kept = cache or partial
-    if kept is None:
-        yield {}
-        return
+    kept = cache or (_unnamed_partial(unnamed) if output is None else output.with_suffix(".partial.npz"))
     from ..io.render_state.flare_cache import read_cache, write_cache
 
     memory = read_cache(kept, lambda line: print_remarks([line])) if kept.exists() else {}
@@ -253,7 +253,8 @@ def remembered(cache: Path | None, output: Path | None = None) -> Iterator[dict[
         raise
     finally:
         if cache is None and not failed:
-            kept.unlink(missing_ok=True)
+            with suppress(OSError):
+                kept.unlink()
         else:
             try:
                 store()
@@ -261,6 +262,21 @@ def remembered(cache: Path | None, output: Path | None = None) -> Iterator[dict[
                 print_remarks([f"the pictures are not kept for a later run: {error}"])
 
 
+def _unnamed_partial(text: str) -> Path:
+    """Return the file with the partial work of a command without an output; those of forgotten commands are deleted."""
+    from ..io.files.state_folder import state_folder
+
+    folder = state_folder() / "partial"
+    with suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+        for path in folder.glob("*.npz"):
+            if time.time() - path.stat().st_mtime > FORGOTTEN_S:
+                path.unlink()
+    return folder / f"{hashlib.sha256(f'{Path.cwd()} {text}'.encode()).hexdigest()[:32]}.npz"
+
+
+FORGOTTEN_S = 30.0 * 86400.0
+"""Age at which partial work in the state folder is deleted."""
 CHECKPOINT_S = 10.0
 """Time between two checkpoints of a long job, unless writing takes more than a tenth of it."""
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..typing import Floats, Indices, Progress
 from .flare import Flare, luminance
 from .statistics import NAMES, Statistics, measure
-from .table import FlareTable
+from .table import FlareTable, Memory, known_picture
 
 # number of initial constellations, and least distance between two, degrees
 FIRST, LEAST_DEG = 13, 0.2
@@ -170,7 +170,9 @@ def sample_curves(
 _FOLLOWED = [NAMES.index(name) for name in ("sum_mm2", "mean", "maximum", "log_average")]
 
 
-def check_curves(curves: Curves, judge: Flare, count: int, progress: Progress | None = None) -> Check:
+def check_curves(
+    curves: Curves, judge: Flare, count: int, progress: Progress | None = None, memory: Memory | None = None
+) -> Check:
     """Compare the curves with renders at constellations between the samples.
 
     Parameters
@@ -180,6 +182,8 @@ def check_curves(curves: Curves, judge: Flare, count: int, progress: Progress | 
         Flare in better quality, over the frame itself, with pixels of the same size.
     count : int
     progress : callable, optional
+    memory : dict, optional
+        Pictures drawn before; new ones are added.
 
     Returns
     -------
@@ -190,9 +194,10 @@ def check_curves(curves: Curves, judge: Flare, count: int, progress: Progress | 
     middles = 0.5 * (at[1:] + at[:-1])
     wanted = np.linspace(at[0], at[-1], count + 2)[1:-1]
     chosen = sorted({float(middles[int(np.argmin(np.abs(middles - angle)))]) for angle in wanted})
-    rendered = []
+    rendered: list[Floats] = []
+    known: Memory = {} if memory is None else memory
     for k, angle in enumerate(chosen):
-        light = luminance(judge.picture(angle, curves.roll_deg))
+        light = luminance(known_picture(judge, known, angle, curves.roll_deg))
         rendered.append(measure(light, np.ones_like(light), judge.sensor.area).values)
         if progress is not None:
             progress((k + 1) / len(chosen), f"check at {angle:.2f} degrees")

@@ -14,7 +14,7 @@ from .contrast import contrast
 from .curves import Check, Curves, bins_of, check_curves, sample_curves
 from .flare import Flare, Frame
 from .statistics import NAMES
-from .table import FlareTable, Memory
+from .table import FlareTable, Memory, known_picture
 
 # number of pictures in the report
 SHOWN = 8
@@ -156,12 +156,12 @@ def predict_occurrence(
     )  # fmt: skip
     check = None
     if flares.judge is not None and wanted.checks > 0:
-        check = check_curves(curves, flares.judge, wanted.checks, reported("checks"))
+        check = check_curves(curves, flares.judge, wanted.checks, reported("checks"), known)
     pictures = []
     if wanted.pictures:
         progress = reported("pictures")
         for k, angle in enumerate(angles := _worth_a_look(curves)):
-            pictures.append((angle, flares.shown.picture(angle, wanted.roll_deg)))
+            pictures.append((angle, known_picture(flares.shown, known, angle, wanted.roll_deg)))
             progress((k + 1) / len(angles), f"{angle:.1f} degrees")
     return Occurrence(
         flares.sampled, flares.frame, flares.quality, curves, wanted.bins, check, None, wanted.setting, tuple(pictures)

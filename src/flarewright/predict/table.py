@@ -20,9 +20,35 @@ DECIMALS = 4
 
 Drawn = dict[tuple[float, float], Pixels]
 Memory = dict[str, Drawn]
-"""Luminance of drawn pictures, by the flare's fingerprint, then by (constellation, roll) in degrees."""
+"""Drawn pictures, by the flare's fingerprint, then by (constellation, roll) in degrees.
 
-__all__ = ["Drawn", "FlareTable", "Memory"]
+Luminance; in colour for a fingerprint with `IN_COLOUR`.
+"""
+IN_COLOUR = "-rgb"
+
+__all__ = ["IN_COLOUR", "Drawn", "FlareTable", "Memory", "known_picture"]
+
+
+def known_picture(flare: Flare, memory: Memory, constellation_deg: float, roll_deg: float) -> Pixels:
+    """Return `Flare.picture`, drawn once.
+
+    Parameters
+    ----------
+    flare : Flare
+    memory : dict
+        Pictures drawn before; a new one is added, unless the flare has no fingerprint.
+    constellation_deg, roll_deg : float
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3)
+    """
+    if not flare.fingerprint:
+        return flare.picture(constellation_deg, roll_deg)
+    drawn, key = memory.setdefault(flare.fingerprint + IN_COLOUR, {}), (constellation_deg, roll_deg)
+    if key not in drawn:
+        drawn[key] = flare.picture(*key)
+    return drawn[key]
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from ..typing import Pixels, Progress
 from .contrast import washed_share
 from .flare import luminance
 from .plan import FlareMaker, Plan, Ranked, near_or_far
+from .table import Memory, known_picture
 
 # largest number of pairs of camera and light
 PICTURES = 6
@@ -39,7 +40,9 @@ class Worst:
     washed: float | None
 
 
-def render_worst(plan: Plan, ranked: Sequence[Ranked], maker: FlareMaker, progress: Progress) -> list[Worst]:
+def render_worst(
+    plan: Plan, ranked: Sequence[Ranked], maker: FlareMaker, progress: Progress, memory: Memory | None = None
+) -> list[Worst]:
     """Render the worst times of the first pairs of a ranking.
 
     Parameters
@@ -49,12 +52,15 @@ def render_worst(plan: Plan, ranked: Sequence[Ranked], maker: FlareMaker, progre
     maker : callable
         Maps (camera, light, diameter_deg, distance_m) to a flare for viewing, over the camera's frame.
     progress : callable
+    memory : dict, optional
+        Pictures drawn before; new ones are added.
 
     Returns
     -------
     list of Worst
     """
     scene = plan.scene
+    known: Memory = {} if memory is None else memory
     chosen = [(one, one.worst) for one in ranked if one.worst is not None and one.worst_veil_cd_m2][:PICTURES]
     out = []
     for k, (one, worst) in enumerate(chosen):
@@ -62,7 +68,8 @@ def render_worst(plan: Plan, ranked: Sequence[Ranked], maker: FlareMaker, progre
         camera, light = scene.cameras[one.camera], scene.lights[one.light]
         flare, _ = near_or_far(maker, camera, light, seen)
         factor = float(seen.illuminance_lx[worst]) / flare.scene_scale
-        drawn = flare.picture(float(seen.constellation_deg[worst]), float(seen.roll_deg[worst]))
+        at = float(seen.constellation_deg[worst]), float(seen.roll_deg[worst])
+        drawn = known_picture(flare, known, *at)
         picture = (drawn * factor).astype(np.float32)
         bright = luminance(picture)
         washed = None

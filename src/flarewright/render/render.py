@@ -40,6 +40,7 @@ from .scene.shots import make_shots
 from .starburst.starburst_pass import OUT_OF_FOCUS_PX, read_soil, starburst_of
 
 if TYPE_CHECKING:
+    from .image.partial_picture import PartialPicture
     from .reference.energy_ledger import Ledger
     from .reference.estimator import ReferenceRun
 
@@ -94,6 +95,7 @@ def render(
     run: ReferenceRun | None = None,
     ledger: bool = False,
     profile: bool = False,
+    kept: PartialPicture | None = None,
     **settings: Unpack[Settings],
 ) -> Rendering:
     """Render the flare of a project, or of a lens with a few settings.
@@ -113,6 +115,8 @@ def render(
         Whether to compute the energy ledger. It costs about a second; in reference quality nothing.
     profile : bool
         Final quality: whether to time the stages of each ghost and count its work.
+    kept : PartialPicture, optional
+        Final quality: keeps the drawn ghosts in files, from which the next render of the same project resumes.
     **settings : Settings
         Fields of `Project` by name; they override the fields of a given project. `coating` also accepts the texts of
         the command line's `--coating`, such as "early-multicoat", "preset:staggered" or a coating file.
@@ -167,7 +171,7 @@ def render(
     else:
         if project.output.starburst and prod(project.camera.size_px) <= PARALLEL_PX:
             starburst = _start_early(starburst, threads)
-        drawn = _ghosts(settled, seen, art, threads, progress, costs)
+        drawn = _ghosts(settled, seen, art, threads, progress, costs, kept)
     passes = list(drawn.passes)
     scattered: dict[str, Any] = {}
     reported: tuple[str, ...] = ()
@@ -276,13 +280,15 @@ def _ghosts(
     threads: int | None,
     progress: Progress | None,
     costs: CostMeter | None,
+    kept: PartialPicture | None,
 ) -> _Drawn:
     project = settled.project
     paths = ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None)
     singles = project.output.brightest if project.output.layers == "ghosts" else 0
     ghosts = render_ghosts(
-        shots, paths, project.quality, singles=singles, art=art.paths, threads=threads, progress=progress, costs=costs
-    )
+        shots, paths, project.quality, singles=singles, art=art.paths, threads=threads, progress=progress, costs=costs,
+        kept=kept,
+    )  # fmt: skip
     facts = {
         "drawn": ghosts.drawn,
         "dark": ghosts.dark,
@@ -306,7 +312,7 @@ def _ghosts(
     if project.quality.mode == "draft":
         return replace(two, remarks=(*reported, "draft quality has no ghosts of four reflections; final quality has"))
     plain = plain_level(shots, paths, threads) if art.paths else ghosts.level
-    four = _fours(settled, shots, (plain, ghosts.level), singles, threads, progress, costs)
+    four = _fours(settled, shots, (plain, ghosts.level), singles, threads, progress, costs, kept)
     return _Drawn(
         two.passes + four.passes, two.others + four.others, {**two.facts, **four.facts}, two.remarks + four.remarks
     )
@@ -320,6 +326,7 @@ def _fours(
     threads: int | None,
     progress: Progress | None,
     costs: CostMeter | None,
+    kept: PartialPicture | None,
 ) -> _Drawn:
     """Draw the four-reflection ghosts above the limit; `levels` of two-reflection ghosts without and with art."""
     from .reference.four_reflections import find_four_reflections
@@ -330,7 +337,7 @@ def _fours(
     art = resolve_art(settled, found.paths)
     ghosts = render_ghosts(
         shots, found.paths, quality.replace(cull=0.0), singles=singles, art=art.paths, level=levels[1],
-        faintest=limit * levels[0], threads=threads, progress=progress, costs=costs,
+        faintest=limit * levels[0], threads=threads, progress=progress, costs=costs, kept=kept,
     )  # fmt: skip
     muted = {name for name, changed in art.paths.items() if not changed.enabled}
     dark, part = found.left_out(muted.union(ghosts.names))

@@ -51,14 +51,12 @@ JOBS = (
     LongJob(("measure", "track"), "DIR/track.journal"),
     LongJob(("measure", "compress"), "DIR/compress.journal"),
     LongJob(("measure", "explain"), "DIR/search.json"),
-    LongJob(("predict",), "NAME.partial.npz", needs=("--output", "-o", "--cache")),
-    LongJob(
-        ("render",), "NAME.state.npz", "flarewright render --resume NAME.state.npz", needs=("reference", "--resume")
-    ),
+    LongJob(("predict",), "NAME.partial.npz"),
+    LongJob(("render",), "NAME.partial, NAME.state.npz", "the same command, or --resume NAME.state.npz"),
     LongJob(("gallery",), "DIR/gallery.json"),
     LongJob(("warm-up",), "the cache of compiled kernels"),
 )
-"""Every command that can run longer than a minute; `render` does at reference quality."""
+"""Every command that can run longer than a minute; `render` has a second file at reference quality."""
 
 
 def job_of(words: Sequence[str]) -> LongJob | None:

@@ -54,7 +54,7 @@ def predict(options: PredictOptions) -> None:
         request = SceneRequest(
             options.output, options.quality or "final", options.near,
             5.0 if options.radius is None else options.radius, options.height or 0.0, options.shortest_shot or 0.0,
-            options.glare, options.threads, options.as_json, options.cache,
+            options.glare, options.threads, options.as_json, options.cache, repr(options),
         )  # fmt: skip
         predict_scene(Path(options.subject), _checked(request, options.radius or options.height))
         return
@@ -70,7 +70,7 @@ def predict(options: PredictOptions) -> None:
     measured = is_ghost_model_file(options.subject)
     project, flares = (None, _of_model(options, size)) if measured else _of_lens(options, size or (36.0, 24.0))
     glare_of = project if options.glare else None
-    _curves(flares, wanted, glare_of, options.threads, options.output, options.as_json, options.cache)
+    _curves(flares, wanted, glare_of, options.threads, options.output, options.as_json, options.cache, repr(options))
 
 
 def _given(options: PredictOptions, names: Sequence[str]) -> dict[str, Any]:
@@ -125,6 +125,7 @@ def _curves(
     output: Path | None,
     as_json: bool,
     cache: Path | None,
+    unnamed: str,
 ) -> None:
     """Predict the curves of one camera and print them."""
     from ...predict.occurrence import occurrence_data, predict_occurrence
@@ -137,7 +138,7 @@ def _curves(
             f"{flares.sampled.least_deg:g} and up to {reach:g}"
         )
     # pictures are kept until the page is written
-    with remembered(cache, output) as memory:
+    with remembered(cache, output, unnamed) as memory:
         with progress_bar() as reported:
             found = predict_occurrence(flares, wanted, reported, memory)
         if glare_of is not None:

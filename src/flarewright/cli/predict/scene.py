@@ -35,6 +35,8 @@ class SceneRequest:
     threads: int | None
     as_json: bool
     cache: Path | None = None
+    unnamed: str = ""
+    """Text that identifies the command, for the place of its partial work without an output."""
 
 
 def is_scene(subject: str) -> bool:
@@ -73,7 +75,7 @@ def predict_scene(path: Path, request: SceneRequest) -> None:
     with naming(path):
         _compile(scene, request.threads)
     # pictures are kept until the page is written
-    with remembered(request.cache, request.output) as memory:
+    with remembered(request.cache, request.output, request.unnamed) as memory:
         with progress_bar() as reported:
             with naming(path):
                 plan = plan_scene(scene, partial(maker, shown=False), reported, memory)
@@ -83,7 +85,7 @@ def predict_scene(path: Path, request: SceneRequest) -> None:
                 found = best_position(plan, camera, request.radius_m, request.height_m, reported("position"))
             worst: list[Worst] = []
             if request.output is not None:
-                worst = render_worst(plan, ranked, partial(maker, shown=True), reported("pictures"))
+                worst = render_worst(plan, ranked, partial(maker, shown=True), reported("pictures"), memory)
         shots = _shots(plan, request.shortest_shot_s)
         glare = [_glare(plan, c, request.threads) if request.glare else None for c in range(len(scene.cameras))]
         print_remarks(plan.remarks)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...errors import ProjectError
+from ...errors import FlarewrightError, OutputError, ProjectError
 from ..common import check_place, first_run_bar, one_bar, print_json, print_remarks
 from ..option_record import with_options
 from .options.record import RenderOptions
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from ...model import Project
     from ...model.project.reference_state import ReferenceState
+    from ...render.image.partial_picture import PartialPicture
     from ...render.reference.energy_ledger import Ledger
     from ...render.reference.estimator import ReferenceRun
     from ...render.render import Rendering
@@ -54,6 +56,7 @@ def render(options: RenderOptions) -> None:
     flags, settings, remarks = _settings(options, state)
     check_exposure(view_of, settings)
     run = _reference_run(options, settings, state)
+    kept = _kept_part(options, settings)
     _keep_inputs(
         settings,
         options.project,
@@ -63,12 +66,21 @@ def render(options: RenderOptions) -> None:
 
     try:
         with naming_rules(flags, settings):
-            rendering = _render(settings, options, run)
+            rendering = _render(settings, options, run, kept)
     except KeyboardInterrupt:
+        if kept is not None and kept.size_bytes:
+            print_remarks(
+                [f"to resume: the same command; {kept.folder} holds {kept.size_bytes / 1e6:.0f} MB until then"]
+            )
         if run is not None and run.state_file is not None and run.state_file.exists():
             print_remarks([f"to resume: flarewright render --resume {run.state_file} -o {options.output}"])
         raise
-    files, written = _write(rendering, options.output, options.full_windows, view_of)
+    except FlarewrightError:
+        # the next run would meet it again
+        if kept is not None:
+            kept.remove()
+        raise
+    files, written = _written(rendering, options, view_of, kept)
     remarks = [*_without_effect(options, settings), *remarks, *rendering.remarks, *written]
     if run is not None and run.state_file is not None and run.state_file.exists():
         remarks.append(f"to reach a smaller --error: --resume {run.state_file}")
@@ -171,6 +183,17 @@ def _reference_run(options: RenderOptions, project: Project, state: ReferenceSta
     return ReferenceRun(state, output.with_name(output.stem + SUFFIX), time_limit)
 
 
+def _kept_part(options: RenderOptions, project: Project) -> PartialPicture | None:
+    """Return where a final render keeps its finished ghosts; None for the other qualities, and when costs are timed."""
+    from ...io.measurement.ghost_model_file import is_ghost_model_file
+
+    if project.quality.mode != "final" or options.profile or is_ghost_model_file(project.lens):
+        return None
+    from ...render.image.partial_picture import SUFFIX, PartialPicture
+
+    return PartialPicture(options.output.with_suffix(SUFFIX), lambda sentence: print_remarks([sentence]))
+
+
 def _print_ledger(ledger: Ledger) -> None:
     """Print the ledger as a table to stderr."""
     from rich.console import Console
@@ -187,17 +210,19 @@ def _print_ledger(ledger: Ledger) -> None:
     Console(stderr=True, markup=False, highlight=False).print(table)
 
 
-def _render(project: Project, options: RenderOptions, run: ReferenceRun | None) -> Rendering:
+def _render(
+    project: Project, options: RenderOptions, run: ReferenceRun | None, kept: PartialPicture | None
+) -> Rendering:
     """Render with a progress bar on a terminal."""
-    draw = _renderer(project, options, run)
+    draw = _renderer(project, options, run, kept)
     with one_bar("rendering") as progress:
         return draw(progress=progress)
 
 
-def _renderer(project: Project, options: RenderOptions, run: ReferenceRun | None) -> Callable[..., Rendering]:
+def _renderer(
+    project: Project, options: RenderOptions, run: ReferenceRun | None, kept: PartialPicture | None
+) -> Callable[..., Rendering]:
     """Return the render function of a project, of a lens or of a measured flare; it takes a progress callback."""
-    from functools import partial
-
     from ...io.measurement.ghost_model_file import is_ghost_model_file
 
     if is_ghost_model_file(project.lens):
@@ -214,8 +239,27 @@ def _renderer(project: Project, options: RenderOptions, run: ReferenceRun | None
         raise ProjectError(f"--profile is for final quality, not for {project.quality.mode}; omit it")
     compile_for_render(project, options.threads, lambda sentence: print_remarks([sentence]), first_run_bar)
     return partial(
-        render_project, project, threads=options.threads, run=run, ledger=options.ledger, profile=options.profile
-    )
+        render_project, project, threads=options.threads, run=run, ledger=options.ledger, profile=options.profile,
+        kept=kept,
+    )  # fmt: skip
+
+
+def _written(
+    rendering: Rendering, options: RenderOptions, look: PreviewLook | None, kept: PartialPicture | None
+) -> tuple[dict[str, Any], list[str]]:
+    """Write the files and delete the kept part; on a full disk, the files get its space. Returns as `_write`."""
+    write = partial(_write, rendering, options.output, options.full_windows, look)
+    if kept is None:
+        return write()
+    try:
+        done = write()
+    except OutputError:
+        if not kept.size_bytes:
+            raise
+        kept.remove()
+        return write()
+    kept.remove()
+    return done
 
 
 def _write(

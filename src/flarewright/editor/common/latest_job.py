@@ -82,13 +82,28 @@ class Lane:
             try:
                 with suppress(Overtaken):
                     job(check)
-            except Exception:
+            except Exception as error:
+                if refused_at_exit(error):
+                    return
                 # a job reports expected errors itself; this one is a bug, and the thread must survive it
                 traceback.print_exc()
             finally:
                 with self._wake:
                     self._busy = False
                     self._wake.notify_all()
+
+
+def refused_at_exit(error: BaseException) -> bool:
+    """Return whether a job failed because the process ends, which is no error of the job.
+
+    Notes
+    -----
+    The end of the main thread first closes all pools, then waits for their workers, and only then stops daemon threads.
+    In between, a job that submits work to a pool gets a RuntimeError. Nothing public reports that state, so the words
+    of the message decide ("cannot schedule new futures after interpreter shutdown", "can't create new thread at
+    interpreter shutdown").
+    """
+    return isinstance(error, RuntimeError) and str(error).endswith("interpreter shutdown")
 
 
 def _lower_priority() -> None:

@@ -30,7 +30,7 @@ from ...optics.rays.pack import resolve_coatings
 from ...render.scene.resolve import first_order, open_lens, resolve_project
 from ...typing import Floats, Mask
 from ..commands.design_targets import clear_ghost_targets, ghost_target_names
-from ..common.latest_job import Check, Lane
+from ..common.latest_job import Check, Lane, refused_at_exit
 from ..preview.display_image import jpeg, pixels_of
 from ..preview.draft_match import Match as Held
 from ..preview.picture import Grade
@@ -223,6 +223,9 @@ class Solver:
             except FlarewrightError as error:
                 if ready.is_set() or not stop.is_set():
                     self._report(False, str(error), 0.0, self.progress.found)
+            except RuntimeError as error:
+                if not refused_at_exit(error):
+                    raise
 
         self._thread = threading.Thread(target=run, name="solver", daemon=True)
         self._thread.start()

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ...errors import FlarewrightError, ProjectError
 from ...model import Project
 from ...render.image.display import view_sum
+from ..common.free_memory import release
 from ..common.latest_job import Check, Lane, Overtaken
 from ..session.image_files import in_short
 from ..session.session import Session
@@ -125,6 +126,9 @@ class Screen:
             self.problem = "the picture could not be drawn: an internal error, printed in the terminal"
             self._publish()
             raise
+        finally:
+            # overtaken pictures leave as much as finished ones
+            release()
 
     def show(self, picture: DrawnPicture) -> None:
         """Show another picture."""

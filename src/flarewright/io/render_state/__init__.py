@@ -1,5 +1,6 @@
 """State of renders between runs of the program.
 
 - `flare_cache`: `read_cache`, `write_cache`, flare pictures of a prediction
+- `partial_planes`: `read_planes`, `write_planes`, ghosts of an interrupted final render
 - `reference_state`: `read_state`, `write_state`, interrupted reference renders
 """

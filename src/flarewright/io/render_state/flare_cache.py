@@ -1,7 +1,7 @@
 """Cache file for the flare pictures of a prediction.
 
-An `.npz` of float32 pictures, shape (H, W), each named FINGERPRINT/CONSTELLATION/ROLL: the fingerprint of the flare's
-source, and two angles in degrees.
+An `.npz` of float32 pictures, shape (H, W) or (H, W, 3), each named FINGERPRINT/CONSTELLATION/ROLL: the fingerprint of
+the flare's source, and two angles in degrees.
 """
 
 from __future__ import annotations
@@ -68,7 +68,12 @@ def _keep(found: Pictures, name: str, data: bytes) -> None:
     """Put a picture of the archive in its place; raise any exception if it is none."""
     fingerprint, constellation, roll = name.removesuffix(".npy").split("/")
     picture = np.load(io.BytesIO(data), allow_pickle=False)
-    if picture.ndim != 2 or picture.dtype != np.float32 or not np.isfinite(picture).all():
+    if (
+        picture.shape[2:] not in ((), (3,))
+        or picture.ndim < 2
+        or picture.dtype != np.float32
+        or not np.isfinite(picture).all()
+    ):
         raise ValueError(name)
     found.setdefault(fingerprint, {})[float(constellation), float(roll)] = picture
 

@@ -294,12 +294,16 @@ def _samples_per_side(step, finest):
 
 @inner
 def _search_cells(steps, lens, light, crossings, iris_radius, corners, hx, hy, across, along, spots, sums):
-    """Trace `across` x `along` rays in each doubtful cell and add the passing ones to `spots` and `sums`."""
+    """Trace `across` x `along` rays in each doubtful cell and add the passing ones to `spots` and `sums`.
+
+    Cells at the mirror axis x = 0 have rays on it: a spot that is not one of a pair is widest there.
+    """
     each = across * along
     px, py = np.empty(corners.shape[0] * each), np.empty(corners.shape[0] * each)
     for k in range(px.size):
         cell, m = k // each, k % each
-        px[k] = corners[cell, 0] + (m // along + 0.5) * hx / across
+        inset = 0.5 if corners[cell, 0] != 0.0 else 0.0
+        px[k] = corners[cell, 0] + (m // along + inset) * hx / across
         py[k] = corners[cell, 1] + (m % along + 0.5) * hy / along
     data = np.empty((px.size, STOP_X + 2 * crossings))
     trace_lanes(steps, lens, light, px, py, data)

@@ -20,6 +20,7 @@ from ...optics.colour.rgb import luminance_weights
 from ...optics.lens.paths import LightPath
 from ...typing import Floats, Mask, Pixels, Progress
 from ..image.canvas import DETAILS, Plane, blank, merge, to_layer
+from ..image.partial_picture import PartialPicture, steps_of
 from ..scene.area_lights import DRAFT_ROUNDING, halvings, motion, spread_border
 from ..scene.art_rules import PLAIN, PathArt
 from ..scene.memory_check import check_memory, spare_bytes
@@ -128,6 +129,7 @@ def render_ghosts(
     threads: int | None = None,
     progress: Progress | None = None,
     costs: CostMeter | None = None,
+    kept: PartialPicture | None = None,
 ) -> GhostPass:
     """Draw the ghosts of all paths and lights.
 
@@ -151,6 +153,8 @@ def render_ghosts(
         Called with the finished part (0 to 1) and the name of the step.
     costs : CostMeter, optional
         Final quality: gets the time and the work of each ghost.
+    kept : PartialPicture, optional
+        Final quality: keeps the drawn ghosts in files.
 
     Returns
     -------
@@ -165,7 +169,7 @@ def render_ghosts(
             if quality.mode == "draft":
                 done = _draft(shots, paths, singles, art, pool, meter)
             else:
-                done = _final(shots, paths, quality, singles, art, (level, faintest), pool, meter, costs)
+                done = _final(shots, paths, quality, singles, art, (level, faintest), pool, meter, costs, kept)
             return replace(done, muted=len(given) - len(paths))
         except BaseException:
             # Ctrl-C arrives here: workers stop at their next wavelength
@@ -184,8 +188,11 @@ def _final(
     pool: ThreadPoolExecutor,
     meter: _ProgressMeter,
     costs: CostMeter | None = None,
+    kept: PartialPicture | None = None,
 ) -> GhostPass:
     others, faintest = levels
+    if kept is not None:
+        kept.begin(f"order{len(paths[0].mirrors) if paths else 0}", shots, paths, quality, singles, art, levels)
     # separate layers need every ghost
     look = ghost_search(shots, paths, art, quality.screen and singles == 0)
 
@@ -221,6 +228,7 @@ def _final(
 
     def draw(group: list[int]) -> list[Plane | None]:
         canvas = blank(shots[0].size_px)
+        steps = steps_of(kept, f"ghosts-{group[0]}", canvas, meter.cancelled)
         # blurring is linear, so ghosts with the same blur or spread are blurred together
         alike: dict[object, list[FinalPass]] = {}
         # rings in a separate layer are judged without the other ghosts
@@ -232,27 +240,30 @@ def _final(
                 if item.source is not None and k not in alone:
                     continue
                 if item.region.seen_flux > 0.0 and item.art.ramps:
-                    draw_alone([item], quality, canvas, meter.cancelled, seen_in, costs=costs)
+                    steps.step(partial(draw_alone, [item], quality, canvas, around=seen_in, costs=costs), whole=False)
                 elif item.region.seen_flux > 0.0 and item.alone:
                     alike.setdefault(item.alone, []).append(item)
                 elif item.region.seen_flux > 0.0:
                     # a separate layer can be brightened later, so it is drawn in full detail
                     visibility = float("inf") if k in alone else edge_contrast(item, seen_level)
-                    draw_final(item, quality, canvas, visibility, meter.cancelled, seen_in, costs=costs)
+                    steps.step(partial(draw_final, item, quality, canvas, visibility, around=seen_in, costs=costs))
             meter.step(f"ghost {name_of[k]}")
         for together in alike.values():
-            draw_alone(together, quality, canvas, meter.cancelled, seen_in, costs=costs)
+            steps.step(partial(draw_alone, together, quality, canvas, around=seen_in, costs=costs), whole=False)
+        steps.end()
         return canvas.planes
 
-    def draw_spread(groups: list[list[FinalPass]]) -> list[Plane | None]:
+    def draw_spread(number: int) -> list[Plane | None]:
         canvas = blank(shots[0].size_px)
-        for group in groups:
-            if not meter.cancelled.is_set():
-                draw_alone(group, quality, canvas, meter.cancelled, around, seen_level, costs)
+        steps = steps_of(kept, f"spread-{number}", canvas, meter.cancelled)
+        for group in wide[number::_MOST_CHUNKS]:
+            work = partial(draw_alone, group, quality, canvas, around=around, level=seen_level, costs=costs)
+            steps.step(work, whole=False)
+        steps.end()
         return canvas.planes
 
     wide = _alike([item for k in order if k not in alone for item in found[k]], seen_level)
-    jobs = [partial(draw_spread, wide[k::_MOST_CHUNKS]) for k in range(min(len(wide), _MOST_CHUNKS))]
+    jobs = [partial(draw_spread, number) for number in range(min(len(wide), _MOST_CHUNKS))]
     total, layers = _collect(shots, order, named, singles, art, draw, pool, jobs, len(shots))
     share = float(flux[~keep].sum() / flux.sum()) if flux.sum() > 0.0 else 0.0
     names = tuple(path.name for path in named)

@@ -3,6 +3,7 @@
 Modules:
 
 - `canvas`: `Canvas`, `merge`, `to_layer`, `lit_window`: planes of flux at several resolutions
+- `partial_picture`: `PartialPicture`, `KeptSteps`: canvases in files, from which an interrupted render resumes
 - `compose`: `beauty`: the sum of layers
 - `shown_layer`: `ShownLayer`: a layer that can show itself in a notebook
 - `gamut`: `apply_gamut`, `compressed`: colours outside the primaries of a file

@@ -1,0 +1,165 @@
+"""A final render that was interrupted resumes to the pixels of one that was not."""
+
+from threading import Event
+
+import numpy as np
+import pytest
+
+from flarewright.model import Art, Camera, Iris, Light, Output, Project, Quality, Rule
+from flarewright.render.image import partial_picture
+from flarewright.render.image.canvas import blank
+from flarewright.render.image.partial_picture import KeptSteps, PartialPicture, digest_of
+from flarewright.render.render import render
+
+POINTS = (Light(field_deg=(9.0, 4.0)), Light(field_deg=(-5.0, 2.0)))
+PROJECT = Project(
+    lens="heliar-tronnier", lights=POINTS, f_number=8.0, iris=Iris(blades=6), camera=Camera(size_px=(96, 64)),
+    quality=Quality(wavelengths=3),
+)  # fmt: skip
+CASES = {
+    "points": PROJECT,
+    "disc": PROJECT.replace(lights=(Light(field_deg=(9.0, 4.0), diameter_deg=2.0), POINTS[1])),
+    "layers": PROJECT.replace(output=Output(layers="ghosts", brightest=3)),
+    "art": PROJECT.replace(art=Art(rules=(Rule(select="all", blur_mm=0.3),))),
+    "four reflections": PROJECT.replace(quality=Quality(wavelengths=3, orders=4)),
+}
+
+
+@pytest.fixture(autouse=True)
+def often(monkeypatch):
+    """Write after every step."""
+    monkeypatch.setattr(partial_picture, "CHECKPOINT_S", 0.0)
+    monkeypatch.setattr(partial_picture, "WRITING", np.inf)
+
+
+def interrupted(project, folder, after):
+    """Render until a number of ghosts is drawn, as Ctrl-C or a killed process would."""
+    seen = []
+
+    def progress(_part, what):
+        seen.append(what.startswith("ghost "))
+        if sum(seen) == after:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        render(project, kept=PartialPicture(folder, print), progress=progress, threads=2)
+    assert list(folder.glob("*.npz"))
+
+
+def resumed(project, folder, threads=1):
+    """Return the layers of the resumed render, and what it reports."""
+    said = []
+    kept = PartialPicture(folder, said.append)
+    found = render(project, kept=kept, threads=threads).layers
+    kept.remove()
+    return found, said
+
+
+def same(ours, theirs):
+    return [layer.name for layer in ours] == [layer.name for layer in theirs] and all(
+        np.array_equal(a.pixels, b.pixels) for a, b in zip(ours, theirs, strict=True)
+    )
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_an_interrupted_render_resumes_to_the_same_pixels(case, tmp_path):
+    folder = tmp_path / "out.partial"
+    interrupted(CASES[case], folder, 12)
+    found, said = resumed(CASES[case], folder)
+    assert same(found, render(CASES[case]).layers)
+    assert said == [f"{folder}: resuming an interrupted run"]
+    assert not folder.exists()
+
+
+def test_a_resumed_render_draws_only_the_other_ghosts(tmp_path, monkeypatch):
+    from flarewright.render.ghosts import ghost_pass
+
+    drawn, draw = [], ghost_pass.draw_final
+    monkeypatch.setattr(
+        ghost_pass, "draw_final", lambda item, *a, **k: (drawn.append(item.path.name), draw(item, *a, **k))
+    )
+    whole = tmp_path / "whole"
+    render(PROJECT, kept=PartialPicture(whole, print))
+    every = len(drawn)
+    interrupted(PROJECT, tmp_path / "out", 10)
+    before = len(drawn) - every
+    resumed(PROJECT, tmp_path / "out")
+    assert before >= 10
+    # every ghost once: the canvas of a cancelled picture is kept with the ghost in progress
+    assert len(drawn) == 2 * every
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        PROJECT.replace(f_number=5.6),
+        PROJECT.replace(lights=(POINTS[0], Light(field_deg=(-5.0, 2.1)))),
+        PROJECT.replace(lens="tessar-brendel"),
+        PROJECT.replace(camera=Camera(size_px=(98, 64))),
+        PROJECT.replace(quality=Quality(wavelengths=3, tolerance_px=0.5)),
+        PROJECT.replace(art=Art(rules=(Rule(select="all", gain=2.0),))),
+    ],
+    ids=["f-number", "light", "lens", "size", "quality", "art"],
+)
+def test_a_part_of_other_settings_is_dropped(other, tmp_path):
+    interrupted(PROJECT, tmp_path / "out", 10)
+    found, said = resumed(other, tmp_path / "out")
+    assert same(found, render(other).layers)
+    assert len(said) == 1
+    assert "belongs to other settings; it is drawn again" in said[0]
+
+
+@pytest.mark.parametrize("harm", [lambda data: b"", lambda data: data[:300], lambda data: b"x" * len(data)])
+def test_a_damaged_part_is_drawn_again(harm, tmp_path):
+    interrupted(PROJECT, tmp_path / "out", 10)
+    for path in (tmp_path / "out").glob("*.npz"):
+        path.write_bytes(harm(path.read_bytes()))
+    found, said = resumed(PROJECT, tmp_path / "out")
+    assert same(found, render(PROJECT).layers)
+    assert len(said) == 1
+    assert said[0].endswith("it is drawn again")
+
+
+def test_a_part_that_cannot_be_written_costs_one_sentence(tmp_path):
+    (tmp_path / "out").write_text("a file of the user")
+    found, said = resumed(PROJECT, tmp_path / "out")
+    assert same(found, render(PROJECT).layers)
+    assert len(said) == 1
+    assert said[0].startswith("no checkpoint: ")
+    assert (tmp_path / "out").read_text() == "a file of the user"
+
+
+def test_a_short_render_writes_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(partial_picture, "CHECKPOINT_S", 600.0)
+    kept = PartialPicture(tmp_path / "out", print)
+    render(PROJECT, kept=kept)
+    assert kept.size_bytes == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_step_that_was_cut_is_not_kept(tmp_path):
+    kept, cancelled, canvas = PartialPicture(tmp_path / "out", print), Event(), blank((8, 8))
+    kept.begin("two", 1)
+    steps = KeptSteps(kept, "a", canvas, cancelled)
+
+    def light(value, stop):
+        canvas.plane()[...] += value
+        if value > 1.0:
+            cancelled.set()
+
+    steps.step(lambda stop: light(1.0, stop))
+    steps.step(lambda stop: light(2.0, stop), whole=False)
+    steps.step(lambda stop: light(4.0, stop))
+    steps.end()
+    again = blank((8, 8))
+    assert kept.load("a", again) == 1
+    assert (again.plane() == 1.0).all()
+
+
+def test_the_digest_depends_on_every_value_and_type():
+    array = np.arange(4.0)
+    values = [None, 0, 0.0, False, "0", b"0", (0,), ((0,),), {"a": 0}, array, array.reshape(2, 2), POINTS[0], POINTS[1]]
+    assert len({digest_of(value) for value in values}) == len(values)
+    assert digest_of(array, POINTS) == digest_of(array.copy(), tuple(POINTS))
+    with pytest.raises(TypeError, match="a object has no digest"):
+        digest_of(object())
