@@ -239,8 +239,11 @@ def bent_weights(shot: Shot, throughput: Floats, spectra: PathSpectrum | None, f
     traced_nm, light = shot.packed.wavelengths_nm, seen_light(shot)
     lit = bright_wavelengths(throughput, fine)
     weights = np.zeros((*throughput.shape, 3))
-    for which in np.unique(lit[lit.any(axis=1)], axis=0):
-        alike = np.flatnonzero((lit == which).all(axis=1))
+    # a number for each combination: `unique` of rows takes as long as a kernel
+    kinds = lit @ (1 << np.arange(lit.shape[1]))
+    for kind in sorted({*kinds.tolist()} - {0}):
+        alike = np.flatnonzero(kinds == kind)
+        which = lit[alike[0]]
         shares, passed = throughput_ratios(which, traced_nm, throughput[alike], fine[alike])
         if spectra is not None:
             passed = passed * spectra.passed[alike]
@@ -310,10 +313,17 @@ def within_gaps(fine_nm: Floats, gaps: Mask) -> NDArray[np.intp]:
     fine_nm : ndarray, shape (M,)
     gaps : ndarray, shape (M - 1,), bool
     """
+    inner, gap = _inner_wavelengths(tuple(fine_nm))
+    found: NDArray[np.intp] = inner[gaps[gap]]
+    return found
+
+
+@lru_cache(maxsize=64)
+def _inner_wavelengths(fine_nm: tuple[float, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return which of `CURVE_NM` lie between rising wavelengths and are none of them, and the gap of each."""
     within = (fine_nm[0] < CURVE_NM) & (fine_nm[-1] > CURVE_NM)
     inner = np.flatnonzero(within & ~np.isin(CURVE_NM, fine_nm))
-    found: NDArray[np.intp] = inner[gaps[np.searchsorted(fine_nm, CURVE_NM[inner]) - 1]]
-    return found
+    return inner, np.searchsorted(fine_nm, CURVE_NM[inner]) - 1
 
 
 def light_up_to_its_end(bright: float, at: Callable[[float], float]) -> tuple[float, float]:
