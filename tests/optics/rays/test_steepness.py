@@ -78,8 +78,8 @@ def test_shares_of_the_traced_add_up_to_what_passes():
 
 def test_the_errors_of_gaps_add_up_to_that_of_the_path():
     """Grey light, and throughput above its line in every gap: all errors have one sign."""
-    light, nodes = np.ones((len(CURVE_NM), 3)), np.linspace(360.0, 780.0, 8)
-    throughput = 1.0 - ((nodes - 570.0) / 300.0) ** 2
+    light, nodes = np.ones((len(CURVE_NM), 3)), np.linspace(360.0, 830.0, 8)
+    throughput = 1.0 - ((nodes - 595.0) / 300.0) ** 2
     passed = np.random.default_rng(6).random(len(CURVE_NM))
     error, total = interpolation_error(passed, light, nodes, throughput)
     errors, shares = gap_errors(passed, light, nodes, throughput[None])

@@ -30,7 +30,7 @@ from flarewright.render.scene.shot import at_fine_wavelengths
 from flarewright.render.scene.shots import make_shots
 
 
-@pytest.mark.parametrize("name", ["13-0", "4-1", "8-7"])
+@pytest.mark.parametrize("name", ["13-0", "4-1", "13-3"])
 def test_interpolated_rays_pass_where_traced_ones_do(name):
     project = Project(
         lens="takumar-50-f1.4", f_number=4.0, lights=(Light(field_deg=(-9.0, 5.0)),), camera=Camera(size_px=(96, 54)),
@@ -42,14 +42,14 @@ def test_interpolated_rays_pass_where_traced_ones_do(name):
     item, opening, tilt = find_final(shot, path), shot.opening, shot.incidence.tilt
     detail = Refinement(float(shot.to_pixels[2]), view_radius=item.view_radius)
     bundle = trace_grid(shot.packed, path, tilt, (opening.radius, opening.inner), item.region, detail)
-    fine, seen = at_fine_wavelengths(shot).packed, visible_rays(shot, item.to_pixels)
+    fine, seen = at_fine_wavelengths(shot).packed, visible_rays(shot, item.to_pixels, bundle.halves)
     alone = replace(bundle, traced={})
     traced = [
-        passing_area(bundle.pupil, bundle.triangles, seen(trace_bundle(fine, w, alone, tilt)))
+        sum(passing_area(bundle.pupil, bundle.triangles, half(trace_bundle(fine, w, alone, tilt))) for half in seen)
         for w in range(len(FINE_NM))
     ]
     found = _areas_between(shot, bundle, FINE_NM, item.to_pixels)
-    # of the three, one falls to a third of its first value, one to a sixth
+    # of the three, one rises to 2.4 times its first value, two fall to a sixth and a fifth
     assert np.abs(found - traced).max() < 0.05 * max(traced)
     assert max(traced) > 1.15 * min(traced)
 

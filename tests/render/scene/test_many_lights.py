@@ -294,7 +294,9 @@ def test_gathered_weights_keep_the_flux_of_every_wavelength():
     )
     weights = shot.weights(shot.packed.wavelengths_nm)
     shown = tuple(sorted(bundle.traced))
-    gathered = gathered_weights(shot.packed, bundle, tilt, weights, shown, visible_rays(shot, shot.to_pixels))
+    gathered = gathered_weights(
+        shot.packed, bundle, tilt, weights, shown, visible_rays(shot, shot.to_pixels, bundle.halves)
+    )
     count = len(weights)
     flux = np.array([
         _flux(bundle, trace_bundle(shot.packed, w, bundle, tilt), path, shot) for w in range(count)
@@ -331,7 +333,7 @@ def test_a_dark_wavelength_leaves_its_light_to_bright_ones(one_color):
         tilt,
         weights,
         shown,
-        visible_rays(shot, np.append(shot.to_pixels[:2], [1e-3, 1e-3])),
+        visible_rays(shot, np.append(shot.to_pixels[:2], [1e-3, 1e-3]), bundle.halves),
     )
     assert gathered_weights(*everything) is None
     gathered = gathered_weights(*everything, careful=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from flarewright.kernels.tracing.sequential import ALIVE, REL, STOP_X, WEIGHT
 from flarewright.model import Camera, Everywhere, Light, Lines, Project, Quality, QuarterWave
@@ -52,9 +53,13 @@ def grid(fine: int) -> Bundle:
     return Bundle(path, np.array(pupil), np.array(triangles), {0: data}, 1)
 
 
+def passes(rays: np.ndarray) -> np.ndarray:
+    return rays[:, ALIVE] > 0.0
+
+
 def test_rays_are_chosen_by_area():
     bundle = grid(12)
-    chosen = spread_rays(bundle, (0,), lambda rays: rays[:, ALIVE] > 0.0, 40)
+    chosen = spread_rays(bundle, (0,), (passes,), 40)
     assert len(chosen) == 40
     # half of the area holds 576 of 580 nodes
     assert 0.4 <= (bundle.pupil[chosen, 0] > 1.0).mean() <= 0.6
@@ -63,10 +68,39 @@ def test_rays_are_chosen_by_area():
 def test_only_rays_that_pass_are_chosen():
     bundle = grid(12)
     bundle.traced[0][bundle.pupil[:, 1] > 0.5, ALIVE] = 0.0
-    chosen = spread_rays(bundle, (0,), lambda rays: rays[:, ALIVE] > 0.0, 40)
+    chosen = spread_rays(bundle, (0,), (passes,), 40)
     assert (bundle.pupil[chosen, 1] <= 0.5).all()
     bundle.traced[0][:, ALIVE] = 0.0
-    assert spread_rays(bundle, (0,), lambda rays: rays[:, ALIVE] > 0.0, 40).size == 0
+    assert spread_rays(bundle, (0,), (passes,), 40).size == 0
+
+
+def test_rays_whose_mirror_image_passes_count_as_well():
+    """The left square passes in one half, the right one in both: two thirds of the light pass the right one."""
+    bundle = grid(1)
+    left = bundle.pupil[:, 0] < 1.0
+    left[np.flatnonzero(bundle.pupil[:, 0] == 1.0)[:2]] = True
+
+    def mirrored(rays: np.ndarray) -> np.ndarray:
+        return passes(rays) & ~left
+
+    chosen = spread_rays(bundle, (0,), (passes, mirrored), 60)
+    assert left[chosen].sum() == pytest.approx(20, abs=2)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.3, 2.0])
+def test_the_mirror_image_of_a_bundle_is_seen_where_its_rays_land(slope):
+    """Against the same rays with the other sign of x, tested as rays of their own."""
+    _, shot = shot_of("tessar-brendel", (8.0, 8.0 * slope))
+    rng = np.random.default_rng(3)
+    rays = np.zeros((400, STOP_X + 2))
+    rays[:, ALIVE], rays[:, REL] = 1.0, 0.5
+    rays[:, :2] = rng.uniform(-30.0, 30.0, (400, 2))
+    rays[:, STOP_X:] = rng.uniform(-1.0, 1.0, (400, 2)) * shot.opening.radius
+    other = rays.copy()
+    other[:, [0, STOP_X]] *= -1.0
+    own, image = visible_rays(shot, shot.to_pixels, 2)
+    assert image(rays).tolist() == own(other).tolist()
+    assert 20 < image(rays).sum() < 380
 
 
 def test_a_bundle_without_a_triangle_has_no_rays():
@@ -74,7 +108,7 @@ def test_a_bundle_without_a_triangle_has_no_rays():
     bundle = grid(2)
     empty = Bundle(bundle.path, bundle.pupil, bundle.triangles[:0], bundle.traced, 1)
     _, shot = shot_of("tessar-brendel", (8.0, 5.0))
-    assert spread_rays(empty, (0,), visible_rays(shot, shot.to_pixels), 12).size == 0
+    assert spread_rays(empty, (0,), visible_rays(shot, shot.to_pixels, 1), 12).size == 0
     assert traced_spectrum(shot, bundle.path, empty, shot.to_pixels) is None
 
 
@@ -84,7 +118,8 @@ def test_rays_beside_the_picture_are_not_seen():
     rays[:, ALIVE], rays[:, REL] = 1.0, 0.5
     rays[1, 0] = 100.0
     rays[2, STOP_X] = 2.0 * shot.opening.radius
-    assert visible_rays(shot, shot.to_pixels)(rays).tolist() == [True, False, False]
+    (seen,) = visible_rays(shot, shot.to_pixels, 1)
+    assert seen(rays).tolist() == [True, False, False]
 
 
 def test_a_faint_ghost_keeps_its_flux_where_only_its_rim_is_in_the_picture():

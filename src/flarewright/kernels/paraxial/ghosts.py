@@ -67,9 +67,9 @@ def path_matrices(rows, actions, curvature, z_vertex, n_gap, sensor_z, to_stop):
             c, d = c + 2.0 * power * a, d + 2.0 * power * b
             heading = -heading
         else:
-            n1, n2 = (n_gap[row], n_gap[row + 1]) if heading > 0.0 else (n_gap[row + 1], n_gap[row])
-            bend = (n1 - n2) / n2 * power
-            c, d = bend * a + n1 / n2 * c, bend * b + n1 / n2 * d
+            ratio = n_gap[row] / n_gap[row + 1] if heading > 0.0 else n_gap[row + 1] / n_gap[row]
+            bend = (ratio - 1.0) * power
+            c, d = bend * a + ratio * c, bend * b + ratio * d
     gap = sensor_z - here
     return a + gap * c, b + gap * d, c, d
 
@@ -102,22 +102,24 @@ def paraxial_sines(rows, actions, curvature, curvature_x, z_vertex, n_gap, y, u,
         if actions[step] == STOP:
             continue
         power = curvature[row] * heading
-        n1, n2 = (n_gap[row], n_gap[row + 1]) if heading > 0.0 else (n_gap[row + 1], n_gap[row])
+        ratio = n_gap[row] / n_gap[row + 1] if heading > 0.0 else n_gap[row + 1] / n_gap[row]
         slope = u + power * y
+        square = slope * slope
         if curvature_x is not None:
             across = ux + curvature_x[row] * heading * x
-            slope = sqrt(slope * slope + across * across)
-        sine = slope / sqrt(1.0 + slope * slope) * (1.0 if n1 <= n2 else n1 / n2)
-        squares[step] = min(sine * sine, 1.0)
+            square += across * across
+        # sin^2 = tan^2 / (1 + tan^2), on the side of the lower index by Snell's law
+        higher = max(ratio, 1.0)
+        squares[step] = min(square / (1.0 + square) * higher * higher, 1.0)
         if actions[step] == REFLECT:
             u += 2.0 * power * y
             if curvature_x is not None:
                 ux += 2.0 * curvature_x[row] * heading * x
             heading = -heading
         else:
-            u = (n1 - n2) / n2 * power * y + n1 / n2 * u
+            u = (ratio - 1.0) * power * y + ratio * u
             if curvature_x is not None:
-                ux = (n1 - n2) / n2 * curvature_x[row] * heading * x + n1 / n2 * ux
+                ux = (ratio - 1.0) * curvature_x[row] * heading * x + ratio * ux
 
 
 @inner

@@ -28,9 +28,12 @@ from .pack import REFLECTANCE_SAMPLES, PackedLens, SensorMirror
 # key of a surface: media in front and behind, indices and thicknesses of films in nm
 _Surface = tuple[Medium | None, Medium | None, tuple[float, ...], tuple[float, ...]]
 
-STEP_NM = 2.5
-CURVE_NM = np.arange(VISIBLE_NM[0], VISIBLE_NM[1] + 0.5 * STEP_NM, STEP_NM)
-"""Integration wavelengths for colours of coatings."""
+CURVE_NM = np.concatenate([
+    np.arange(VISIBLE_NM[0], 700.0, 2.5), np.arange(700.0, VISIBLE_NM[1], 5.0),
+    [VISIBLE_NM[1], 785.0, 790.0, 795.0, 802.5, 810.0, 820.0, 830.0],
+])  # fmt: skip
+"""Integration wavelengths for colours of coatings: dense where the eye sees much, up to the end of the colour matching
+functions, because films reflect so much beyond `VISIBLE_NM` that its light counts under a black body of 2000 K."""
 
 COSINES = 65
 """Samples of a curve over the cosine of incidence; a line between them errs by 6e-5 of R at most up to 60 degrees."""
@@ -290,7 +293,7 @@ def products_between(
     return through
 
 
-def step_squares(packed: PackedLens, path: LightPath, tilt: float, points: Floats) -> Floats:
+def step_squares(packed: PackedLens, path: LightPath, tilt: float, points: Floats, wave: int | None = None) -> Floats:
     """Return the angles at which traced rays meet the surfaces of a path.
 
     Parameters
@@ -301,14 +304,16 @@ def step_squares(packed: PackedLens, path: LightPath, tilt: float, points: Float
         From `optics.rays.bundle.incidence`.
     points : ndarray, shape (N, 2)
         On the plane of the first vertex, meridional frame, mm.
+    wave : int, optional
+        Index of the traced wavelength; None: the middle one.
 
     Returns
     -------
     ndarray, shape (N, S)
-        Squared sines on the side of the lower index at every step, at the middle traced wavelength; 1 under total
-        reflection. Only rays that reach the sensor's plane, so N can be smaller.
+        Squared sines on the side of the lower index at every step; 1 under total reflection. Only rays that reach the
+        sensor's plane, so N can be smaller.
     """
-    n = packed.n_gap[len(packed.n_gap) // 2]
+    n = packed.n_gap[len(packed.n_gap) // 2 if wave is None else wave]
     squares = np.empty((len(points), len(path.rows)))
     count = traced_squares(
         path.rows, path.actions, packed.curvature, packed.form, packed.z_vertex, n, packed.sensor_z, tilt,

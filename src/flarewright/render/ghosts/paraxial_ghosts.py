@@ -214,7 +214,8 @@ def _carried(
     """
     if bands is None:
         return np.ones((len(paths), len(near)))
-    return products_between(bands.means[:, :, near], paths, squares, angles, np.eye(len(near)))
+    # `take` keeps the memory order that the kernel needs
+    return products_between(np.take(bands.means, near, axis=2), paths, squares, angles, np.eye(len(near)))
 
 
 def _curve(

@@ -8,7 +8,7 @@ are ghosts whose throughput at the traced wavelengths and at the ends of the spe
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import permutations
@@ -26,7 +26,7 @@ from ...optics.rays.bundle import Bundle, trace_bundle
 from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum
 from ...optics.rays.steepness import bright_wavelengths, gap_errors, interpolation_error, throughput_ratios
 from ...typing import Floats, Mask
-from ..scene.path_color import visible_rays
+from ..scene.path_color import RayFilter, visible_rays
 from ..scene.shot import Shot
 
 # lowest expected colour error for a correction, relative to the ghost's largest channel
@@ -147,10 +147,13 @@ def bent_spectrum(
 
 def _areas(shot: Shot, bundle: Bundle, waves: list[int], to_pixels: Floats) -> Floats:
     """Return the visible area of the pupil at some wavelengths, mm^2, shape (len(waves),)."""
-    seen, tilt = visible_rays(shot, to_pixels), shot.incidence.tilt
-    return np.array([
-        passing_area(bundle.pupil, bundle.triangles, seen(trace_bundle(shot.packed, w, bundle, tilt))) for w in waves
-    ])  # fmt: skip
+    seen, tilt = visible_rays(shot, to_pixels, bundle.halves), shot.incidence.tilt
+    return np.array([_area_of(bundle, trace_bundle(shot.packed, w, bundle, tilt), seen) for w in waves])
+
+
+def _area_of(bundle: Bundle, rays: Floats, seen: Sequence[RayFilter]) -> float:
+    """Return the visible area of the pupil, in both halves of a bundle, mm^2."""
+    return float(sum(passing_area(bundle.pupil, bundle.triangles, one(rays)) for one in seen))
 
 
 def _areas_between(shot: Shot, bundle: Bundle, wavelengths_nm: Floats, to_pixels: Floats) -> Floats:
@@ -159,7 +162,7 @@ def _areas_between(shot: Shot, bundle: Bundle, wavelengths_nm: Floats, to_pixels
     Indices of glass are nearly linear in 1 / wavelength^2 (Cauchy), and so are rays: through three wavelengths they are
     polynomials in it.
     """
-    seen, held = visible_rays(shot, to_pixels), sorted(bundle.traced)
+    seen, held = visible_rays(shot, to_pixels, bundle.halves), sorted(bundle.traced)
     held_nm = shot.packed.wavelengths_nm[held]
     areas = np.empty(len(wavelengths_nm))
     for k, shares in enumerate(_lagrange(tuple(held_nm**-2.0), tuple(wavelengths_nm**-2.0))):
@@ -172,7 +175,7 @@ def _areas_between(shot: Shot, bundle: Bundle, wavelengths_nm: Floats, to_pixels
             # a ray that ends at one wavelength is unknown elsewhere: it counts as at the nearest wavelength
             ended = ~(np.abs(data[:, ALIVE] - 1.0) < ROUNDING)
             data[ended] = nearest[ended]
-        areas[k] = passing_area(bundle.pupil, bundle.triangles, seen(data))
+        areas[k] = _area_of(bundle, data, seen)
     return areas
 
 
@@ -236,8 +239,11 @@ def bent_weights(shot: Shot, throughput: Floats, spectra: PathSpectrum | None, f
     traced_nm, light = shot.packed.wavelengths_nm, seen_light(shot)
     lit = bright_wavelengths(throughput, fine)
     weights = np.zeros((*throughput.shape, 3))
-    for which in np.unique(lit[lit.any(axis=1)], axis=0):
-        alike = np.flatnonzero((lit == which).all(axis=1))
+    # a number for each combination: `unique` of rows takes as long as a kernel
+    kinds = lit @ (1 << np.arange(lit.shape[1]))
+    for kind in sorted({*kinds.tolist()} - {0}):
+        alike = np.flatnonzero(kinds == kind)
+        which = lit[alike[0]]
         shares, passed = throughput_ratios(which, traced_nm, throughput[alike], fine[alike])
         if spectra is not None:
             passed = passed * spectra.passed[alike]
@@ -307,10 +313,17 @@ def within_gaps(fine_nm: Floats, gaps: Mask) -> NDArray[np.intp]:
     fine_nm : ndarray, shape (M,)
     gaps : ndarray, shape (M - 1,), bool
     """
+    inner, gap = _inner_wavelengths(tuple(fine_nm))
+    found: NDArray[np.intp] = inner[gaps[gap]]
+    return found
+
+
+@lru_cache(maxsize=64)
+def _inner_wavelengths(fine_nm: tuple[float, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return which of `CURVE_NM` lie between rising wavelengths and are none of them, and the gap of each."""
     within = (fine_nm[0] < CURVE_NM) & (fine_nm[-1] > CURVE_NM)
     inner = np.flatnonzero(within & ~np.isin(CURVE_NM, fine_nm))
-    found: NDArray[np.intp] = inner[gaps[np.searchsorted(fine_nm, CURVE_NM[inner]) - 1]]
-    return found
+    return inner, np.searchsorted(fine_nm, CURVE_NM[inner]) - 1
 
 
 def light_up_to_its_end(bright: float, at: Callable[[float], float]) -> tuple[float, float]:

@@ -337,7 +337,7 @@ def _drawn_in_few(
     plane, to_pixels = canvas.plane(detail), item.to_pixels / 2.0**detail
     shown = tuple(sorted(bundle.traced))
     colors = shot.weights(shot.packed.wavelengths_nm, spectrum) * item.art.rgb
-    seen = visible_rays(shot, item.to_pixels)
+    seen = visible_rays(shot, item.to_pixels, bundle.halves)
     weights = gathered_weights(shot.packed, bundle, shot.incidence.tilt, colors, shown, seen, careful=careful)
     watch.lap("colour")
     if weights is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -10,8 +10,8 @@ import numpy as np
 from ...kernels.tracing.sequential import WEIGHT
 from ...optics.rays.bundle import Bundle, trace_points
 from ...optics.rays.pack import PackedLens
-from ...typing import Floats, Mask
-from ..scene.path_color import spread_rays
+from ...typing import Floats
+from ..scene.path_color import RayFilter, spread_rays
 
 # number of rays that compare the throughput of a path at different wavelengths
 SAMPLE_RAYS = 48
@@ -29,7 +29,7 @@ def gathered_weights(
     tilt: float,
     weights: Floats,
     shown: tuple[int, ...],
-    seen: Callable[[Floats], Mask],
+    seen: Sequence[RayFilter],
     *,
     careful: bool = True,
 ) -> dict[int, Floats] | None:
@@ -46,8 +46,8 @@ def gathered_weights(
         Weight of each wavelength in each channel.
     shown : tuple of int
         The wavelengths to draw where bright enough, rising.
-    seen : callable
-        Returns a mask of the traced rays (`optics.rays.bundle.trace_points`) that pass and land in the picture.
+    seen : sequence of callable
+        For each half of the bundle, a mask of the traced rays that pass and land in the picture (`visible_rays`).
     careful : bool
         Whether to compare the cut and position of the path at the ends of the spectrum, and to draw all of `shown` or
         none.
@@ -76,7 +76,7 @@ def gathered_weights(
     rays = np.concatenate([
         held[w][where] if w in held else trace_points(packed, w, bundle.path, tilt, places) for w in range(count)
     ])  # fmt: skip
-    flux = np.where(seen(rays), rays[:, WEIGHT], 0.0).reshape(count, -1).sum(axis=1)
+    flux = (np.sum([one(rays) for one in seen], axis=0) * rays[:, WEIGHT]).reshape(count, -1).sum(axis=1)
     # a coating can make a path dark at a wavelength; there is little light to redistribute then
     least = LEAST_PART * flux.max()
     drawn = tuple(w for w in shown if flux[w] > least) or (int(flux.argmax()),)
@@ -93,7 +93,7 @@ def _hats(count: int, drawn: tuple[int, ...]) -> Floats:
 
 
 def _seen_alike(
-    packed: PackedLens, bundle: Bundle, tilt: float, shown: tuple[int, ...], seen: Callable[[Floats], Mask]
+    packed: PackedLens, bundle: Bundle, tilt: float, shown: tuple[int, ...], seen: Sequence[RayFilter]
 ) -> bool:
     """Return whether the same rays are visible at the ends of the spectrum as at the nearest drawn wavelengths."""
     where = spread_rays(bundle, (), seen, 2 * SAMPLE_RAYS)
@@ -101,8 +101,8 @@ def _seen_alike(
     for end, near in ((0, shown[0]), (last, shown[-1])):
         if end == near:
             continue
-        here = seen(bundle.traced[near][where])
-        there = seen(trace_points(packed, end, bundle.path, tilt, bundle.pupil[where]))
+        rays = bundle.traced[near][where], trace_points(packed, end, bundle.path, tilt, bundle.pupil[where])
+        here, there = (np.concatenate([one(at) for one in seen]) for at in rays)
         if (there != here).sum() > MOST_UNLIKE * max(int(here.sum()), 1):
             return False
     return True

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...kernels.tracing.representative_rays import choose_representatives, seen_rays
 from ...model import Lens
+from ...optics.colour.spectrum import mean_wavelength
 from ...optics.lens.paths import LightPath, direct_path
 from ...optics.rays.bundle import Bundle
 from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum, path_spectra, step_squares
@@ -16,11 +18,22 @@ from ...typing import Floats, Mask
 from .shot import Shot
 
 # number of rays of a bundle that represent its angles of incidence
-RAYS = 48
+RAYS = 64
 # number of triangles of the grid among which they are chosen
-TRIANGLES = 512
+TRIANGLES = 4096
 
-__all__ = ["direct_flux", "direct_spectrum", "pixel_frame", "spread_rays", "traced_spectrum", "visible_rays"]
+# a mask of the traced rays that pass
+RayFilter = Callable[[Floats], Mask]
+
+__all__ = [
+    "RayFilter",
+    "direct_flux",
+    "direct_spectrum",
+    "pixel_frame",
+    "spread_rays",
+    "traced_spectrum",
+    "visible_rays",
+]
 
 
 def traced_spectrum(shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floats) -> PathSpectrum | None:
@@ -42,33 +55,43 @@ def traced_spectrum(shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floa
     """
     if shot.curves is None:
         return None
-    rays = bundle.pupil[_representative_rays(shot, bundle, to_pixels)]
-    squares = step_squares(shot.packed, path, shot.incidence.tilt, rays)
+    rays, wave = _representative_rays(shot, bundle, to_pixels)
+    squares = step_squares(shot.packed, path, shot.incidence.tilt, bundle.pupil[rays], wave)
     if len(squares) == 0:
         return None
     return path_spectra(shot.curves, [path], squares).of(0)
 
 
-def _representative_rays(shot: Shot, bundle: Bundle, to_pixels: Floats) -> NDArray[np.intp]:
-    """Choose rays that represent a ghost's light: visible ones, else passing ones, else any that reach the iris."""
-    held = sorted(bundle.traced)
-    middle = held[len(held) // 2]
+def _representative_rays(shot: Shot, bundle: Bundle, to_pixels: Floats) -> tuple[NDArray[np.intp], int]:
+    """Choose rays that represent a ghost's light: visible ones, else passing ones, else any that reach the iris.
+
+    Returns
+    -------
+    rays : ndarray of int
+        Nodes of the bundle.
+    wave : int
+        Index of the traced wavelength at which they pass.
+    """
+    held_nm = shot.packed.wavelengths_nm[sorted(bundle.traced)]
+    # where most light is: other rays of a ghost land in the picture at other wavelengths, at other angles
+    order = np.argsort(np.abs(held_nm - mean_wavelength(shot.light.spectrum)), kind="stable")
+    waves = [sorted(bundle.traced)[k] for k in order]
     anywhere = np.zeros((2, 3)), (np.inf, np.inf)
     looks = (
-        visible_rays(shot, to_pixels),
-        _visible(shot, *anywhere),
-        _visible(shot, *anywhere, blades=np.empty((0, 4))),
+        visible_rays(shot, to_pixels, bundle.halves),
+        _visible(shot, *anywhere, bundle.halves),
+        _visible(shot, *anywhere, bundle.halves, blades=np.empty((0, 4))),
     )
     for seen in looks:
         # a sliver can pass at one end of the spectrum only
-        for w in sorted(held, key=lambda w: abs(w - middle)):
+        for w in waves:
             chosen = spread_rays(bundle, (w,), seen, RAYS)
             if chosen.size > 0:
-                return chosen
-    return np.empty(0, dtype=np.intp)
+                return chosen, w
+    return np.empty(0, dtype=np.intp), waves[0]
 
 
-def spread_rays(bundle: Bundle, waves: Sequence[int], passes: Callable[[Floats], Mask], count: int) -> NDArray[np.intp]:
+def spread_rays(bundle: Bundle, waves: Sequence[int], passes: Sequence[RayFilter], count: int) -> NDArray[np.intp]:
     """Choose rays that represent a bundle's light.
 
     Parameters
@@ -76,8 +99,8 @@ def spread_rays(bundle: Bundle, waves: Sequence[int], passes: Callable[[Floats],
     bundle : Bundle
     waves : sequence of int
         Traced wavelengths at which each ray must pass; empty: choose among all rays.
-    passes : callable
-        Returns a mask of the traced rays that pass.
+    passes : sequence of callable
+        For each half of the bundle, a mask of the traced rays that pass.
     count : int
 
     Returns
@@ -86,43 +109,53 @@ def spread_rays(bundle: Bundle, waves: Sequence[int], passes: Callable[[Floats],
         Nodes of the bundle, spread evenly over the pupil's area: a node is chosen in proportion to the area of its
         triangles, because the grid is finer at edges and folds. Empty if no ray passes.
     """
-    passing = np.ones(len(bundle.pupil), dtype=np.bool_)
+    halves, nodes = len(passes), len(bundle.pupil)
+    passing = np.ones((halves, nodes), dtype=np.bool_)
     for w in waves:
-        passing &= passes(bundle.traced[w])
-    step = max(1, len(bundle.triangles) // TRIANGLES)
-    chosen: NDArray[np.intp] = choose_representatives(bundle.pupil, bundle.triangles, passing, step, count)
-    return chosen
+        passing &= [one(bundle.traced[w]) for one in passes]
+    few = bundle.triangles[:: max(1, len(bundle.triangles) // TRIANGLES)]
+    # both halves of a triangle in a row, so that rays are as many places of the pupil as without halves
+    triangles = np.stack([few + half * nodes for half in range(halves)], axis=1).reshape(-1, 3)
+    chosen: NDArray[np.intp] = choose_representatives(
+        np.concatenate([bundle.pupil] * halves), triangles, passing.ravel(), 1, count
+    )
+    return chosen % nodes
 
 
-def visible_rays(shot: Shot, to_pixels: Floats) -> Callable[[Floats], Mask]:
-    """Return a function that selects traced rays which pass all edges and the iris and land in the picture.
+def visible_rays(shot: Shot, to_pixels: Floats, halves: int) -> tuple[RayFilter, ...]:
+    """Return functions that select traced rays which pass all edges and the iris and land in the picture.
 
     Parameters
     ----------
     shot : Shot
     to_pixels : ndarray, shape (4,)
         Of the shot or of a ghost.
+    halves : int
+        Of the bundle. Its mirror image passes other blades and lands elsewhere in the picture.
 
     Returns
     -------
-    callable
-        From rays as in `optics.rays.bundle.trace_points`, shape (N, 5 + 2 C), to a mask of shape (N,).
+    tuple of callable
+        For the bundle and its mirror image: from the bundle's rays as in `optics.rays.bundle.trace_points`, shape
+        (N, 5 + 2 C), to a mask of shape (N,).
     """
-    return _visible(shot, pixel_frame(shot, to_pixels), shot.size_px)
+    return _visible(shot, pixel_frame(shot, to_pixels), shot.size_px, halves)
 
 
 def _visible(
-    shot: Shot, place: Floats, size_px: tuple[float, float], blades: Floats | None = None
-) -> Callable[[Floats], Mask]:
+    shot: Shot, place: Floats, size_px: tuple[float, float], halves: int, blades: Floats | None = None
+) -> tuple[RayFilter, ...]:
     """As `visible_rays`, for a picture of any size, also infinite, with positions as in `seen_rays`, and blades."""
-    opening, axes, width, height = shot.opening, shot.incidence.axes, float(size_px[0]), float(size_px[1])
+    opening, width, height = shot.opening, float(size_px[0]), float(size_px[1])
     blades = opening.blades if blades is None else blades
 
-    def seen(rays: Floats) -> Mask:
-        mask: Mask = seen_rays(rays, opening.radius, blades, axes, place, width, height)
+    def seen(mirror: float, rays: Floats) -> Mask:
+        # x of the meridional frame changes its sign
+        axes, where = shot.incidence.axes * [[mirror], [1.0]], place * [1.0, mirror, 1.0]
+        mask: Mask = seen_rays(rays, opening.radius, blades, axes, where, width, height)
         return mask
 
-    return seen
+    return tuple(partial(seen, mirror) for mirror in (1.0, -1.0)[:halves])
 
 
 def pixel_frame(shot: Shot, to_pixels: Floats) -> Floats:
