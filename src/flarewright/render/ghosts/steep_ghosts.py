@@ -320,7 +320,7 @@ def within_gaps(fine_nm: Floats, gaps: Mask) -> NDArray[np.intp]:
 
 @lru_cache(maxsize=64)
 def _inner_wavelengths(fine_nm: tuple[float, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return which of `CURVE_NM` lie between rising wavelengths and are none of them, and the gap of each."""
+    """Return which of `CURVE_NM` lie strictly within a gap between rising wavelengths, and the gap of each."""
     within = (fine_nm[0] < CURVE_NM) & (fine_nm[-1] > CURVE_NM)
     inner = np.flatnonzero(within & ~np.isin(CURVE_NM, fine_nm))
     return inner, np.searchsorted(fine_nm, CURVE_NM[inner]) - 1
