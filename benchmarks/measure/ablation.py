@@ -38,7 +38,6 @@ from flarewright.measure.core.views import View, views_of
 from flarewright.measure.pipeline.find_stage import find_ghosts
 from flarewright.measure.pipeline.fit_stage import fit_ghosts
 from flarewright.measure.replay import model_image
-from flarewright.measure.residual import blob_sprites
 from flarewright.measure.residual.learn import with_residual
 from flarewright.model.measurement.capture import FrameInfo, MergedFrame
 from flarewright.model.measurement.ghost_model import GhostModel
@@ -49,8 +48,6 @@ from flarewright.typing import Floats, Pixels, Report
 LENSES = ("speed-panchro-50", "flektogon-35", "takumar-50-f1.4")
 SCORES = ("between, linear", "between, log", "rolled, linear", "rolled, log")
 WIDTH, COUNT = 240, 21
-# width of the measurements that the program is tuned for, pixels
-FULL_WIDTH = 720
 # largest number of ghosts: a fit of all would take minutes
 MOST = 12
 # first and last constellation
@@ -220,16 +217,13 @@ def ablate(case: Case, tell: Report) -> dict[str, dict[str, float]]:
         return lambda held: model_image.replay_model(model, held.constellation_deg, roll_deg=held.roll_deg)[0].pixels
 
     rows = {}
-    # a blob is as large a part of the picture as at full size
-    blob_px = blob_sprites._LARGEST_HALF_PX * case.views[0].size_px[0] / FULL_WIDTH
-    small = {f"{_LEARN}.blob_sprites._LARGEST_HALF_PX": blob_px}
     for name in ("interpolation", "optical flow", "rotated photograph"):
         rows[name] = scores(case, lambda held, name=name: held.free.get(name))  # type: ignore[misc]
     rows["no residual"] = scores(case, of(case.model))
     for name, parts in {"all layers": {}, **{f"without {layer}": parts for layer, parts in LAYERS.items()}}.items():
         start = time.process_time()
         with ExitStack() as stack:
-            for target, other in {**small, **parts}.items():
+            for target, other in parts.items():
                 stack.enter_context(mock.patch(target, other))
             rows[name] = scores(case, of(with_residual(case.model, case.views)))
         tell(f"  {name}: {time.process_time() - start:.0f} CPU s")

@@ -75,7 +75,7 @@ def switching(cost: Floats, shortest: int = 1) -> tuple[Shot, ...]:
     Notes
     -----
     Exact, by dynamic programming over the end of a shot: the best sequence up to time t ends with a shot of at least
-    `shortest`. Compared with an exhaustive search in tests/predict/test_planning.py.
+    `shortest`. Compared with an exhaustive search in tests/predict/test_plan.py.
     """
     cameras, count = cost.shape
     shortest = min(max(shortest, 1), count)

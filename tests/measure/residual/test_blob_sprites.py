@@ -23,7 +23,7 @@ from flarewright.model.measurement.sprite import Sprite, encode_pictures
 CAPTURED = np.arange(1.0, LARGEST + 0.1, 1.0)
 BETWEEN = 0.5 * (CAPTURED[:-1] + CAPTURED[1:])
 # far brighter than its surroundings, with a soft border like the image of any light of finite size
-BLOB = shape(-110.0, 3.0, 80.0)
+BLOB = shape(-110.0, 2.0, 80.0)
 BLOB.numbers[SOFT] = 0.7**2
 # and a large ghost, which is no blob
 TRUE = (BLOB, shape(60.0, 18.0, 0.6))
@@ -66,6 +66,18 @@ def test_small_bright_ghosts_alone_are_blobs(run):
     assert len(blob.outlines) == len(seen)
     faint = model_of((shape(-110.0, 3.0, 0.02), TRUE[1]), seen)
     assert blobs_of(faint, seen) == ()
+
+
+def test_a_ghost_as_wide_as_a_blob_of_a_large_picture_is_no_blob_of_a_small_one(run):
+    _, seen = run
+    ghost = shape(-110.0, 4.0, 80.0)
+    ghost.numbers[SOFT] = BLOB.numbers[SOFT]
+    wide = model_of((ghost, TRUE[1]), seen)
+    at = blob_outline(pack(wide), wide, wide.ghosts[0].name, 5.0)
+    # of 720 pixels a blob has up to 12 to each side
+    assert at is not None
+    assert 8.0 < max(at.half) < 12.0
+    assert blobs_of(wide, seen) == ()
 
 
 def test_the_outline_of_a_disc_is_where_the_disc_is(run):

@@ -15,7 +15,7 @@ from ...model import Project
 from ...render.scene.resolve import open_lens
 from .history import History
 
-# fields of the model that name files of pictures (tests/editor/test_editor_reach.py)
+# fields of the model that name files of pictures (tests/editor/session/test_reach.py)
 FIELDS = ("image", "depth", "mask")
 
 

@@ -31,7 +31,7 @@ def assign(cost, count, ghosts, chosen, price, held, way, least, seen):
     Notes
     -----
     Augmenting row reduction, then shortest augmenting paths (Jonker and Volgenant 1987). Compared with scipy's
-    `linear_sum_assignment` in tests/design/test_match.py.
+    `linear_sum_assignment` in tests/kernels/design/test_assignment.py.
     """
     for g in range(ghosts):
         held[g] = -1

@@ -29,8 +29,9 @@ from .sprite_fit import DIGIT, darkest_noise, even_knots
 
 # lengths below are pixels of images up to this width, and scale with wider ones
 _WIDTH = 720.0
-# half the longer side of the largest blob
-_LARGEST_HALF_PX = 12.0
+# half the longer side of the largest blob, and the part of it that is the soft border of any ghost: small images have
+# the whole border too, and with it a ghost of 1 px radius has 7
+_LARGEST_HALF_PX, _BORDER_PX = 12.0, 6.0
 # least peak of a blob over the noise of the darkest pixels; the coarse images represent fainter ones as well
 _BRIGHT = 100.0
 # least residual, part of the light, at the place of a blob for it to count as visible where the model hides it
@@ -126,7 +127,8 @@ def _unit(view: View) -> float:
 
 def _small(drawn: Packed, model: GhostModel, name: str, view: View) -> Outline | None:
     """Return the outline of a ghost in a view, or None if it is large or outside the picture."""
-    at = blob_outline(drawn, model, name, view.constellation_deg, _LARGEST_HALF_PX * _unit(view))
+    largest = _BORDER_PX + (_LARGEST_HALF_PX - _BORDER_PX) * min(1.0, view.size_px[0] / _WIDTH)
+    at = blob_outline(drawn, model, name, view.constellation_deg, largest * _unit(view))
     if at is None:
         return None
     inside = all(0.0 <= each <= side for each, side in zip(at.place(view.frame), view.size_px, strict=True))
