@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from flarewright.editor.commands.light_path import length_s
+from flarewright.workflow.keyframes import length_s
 from flarewright.editor.commands.registry import done
 from flarewright.editor.preview.display_image import png
 from flarewright.editor.preview.render_picture import pictured

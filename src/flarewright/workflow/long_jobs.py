@@ -55,6 +55,7 @@ JOBS = (
     LongJob(
         ("render",), "NAME.state.npz", "flarewright render --resume NAME.state.npz", needs=("reference", "--resume")
     ),
+    LongJob(("shot",), "the finished frames"),
     LongJob(("gallery",), "DIR/gallery.json"),
     LongJob(("warm-up",), "the cache of compiled kernels"),
 )

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from ...errors import ProjectError
-from ...model import Art, Dirt, Light, Starburst
+from ...model import Art, Dirt, Light, Starburst, Timeline
 from ...model.project import project as choices
 from ...model.project.project import CoatingChoice, Project
 from ..lens.coating_text import UNCOATED, format_coating
@@ -43,6 +43,9 @@ ABOUT = {
     "lights.distance": "2000.0   # mm in front of the first vertex; default: infinity",
     "lights.shape": '{ kind = "rectangle", size_deg = [4.0, 3.0], rotation_deg = 15.0 }   # or "polygon", corners_deg',
     "lights.holdout": '{ image = "leaves.png", invert = true }   # hides only this light',
+    "lights.motion": '"linear" or "smooth", between keyframes',
+    "timeline.fps": "frames per second of a shot",
+    "timeline.start": "number of the frame at 0 s",
     "lights.intensity": "irradiance on a plane that faces the light",
     "lights.diameter_deg": "angular diameter: 0.53 for the sun, 0 for a point",
     "iris.roughness_um": "rms roughness of the blade edges",
@@ -188,7 +191,13 @@ def project_data(project: Project, folder: Path | None = None) -> dict[str, Any]
     for written, light in zip(data["lights"], project.lights, strict=True):
         written["spectrum"] = spectrum_text(light.spectrum) or written["spectrum"]
         if not light.keyframes:
-            del written["keyframes"]
+            del written["keyframes"], written["motion"]
+        if not light.curves:
+            del written["curves"]
+    if not project.curves:
+        del data["curves"]
+    if project.timeline == Timeline():
+        del data["timeline"]
     return data
 
 
