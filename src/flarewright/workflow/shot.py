@@ -172,8 +172,10 @@ def shot_frames(project: Project, frames: str | Sequence[int] | None) -> tuple[t
             f"{timeline.start} is at 0 s, the last key at {long_s:g} s); give frames inside, or start={numbers[0]}, "
             "the number of the frame at 0 s"
         )
-    rest = f"frames {frames_text(outside)[:80]} lie outside the keys, {timeline.start}-{last}: everything rests there"
-    return numbers, [rest] if outside else []
+    if not outside:
+        return numbers, []
+    which = f"frames {frames_text(outside)[:80]} lie" if len(outside) > 1 else f"frame {outside[0]} lies"
+    return numbers, [f"{which} outside the keys, {timeline.start}-{last}: everything rests there"]
 
 
 def _remarks(done: Sequence[FrameResult]) -> list[str]:
