@@ -110,12 +110,12 @@ def test_another_image_version_or_output_draws_again(change, tmp_path, monkeypat
     from PIL import Image
 
     matte = tmp_path / "matte.png"
-    Image.new("L", (16, 16), 255).save(matte)
+    Image.new("L", (64, 36), 255).save(matte)
     given = {"holdout": Holdout(image=str(matte))}
     out = tmp_path / "f.#.exr"
     shot(project(**given), out, frames=[1], processes=1)
     if change == "matte":
-        Image.new("L", (16, 16), 128).save(matte)
+        Image.new("L", (64, 36), 128).save(matte)
     elif change == "version":
         monkeypatch.setattr(shot_frame, "__version__", "99")
     else:
