@@ -34,7 +34,6 @@ def serve() -> None:
     os.dup2(2, 1)
     items: SimpleQueue[Any] = SimpleQueue()
     Thread(target=_receive, args=(items,), daemon=True).start()
-    # no name of a package's module, only of its code
     where, context, threads = items.get()
     try:
         function = named(where)
@@ -81,5 +80,5 @@ def _answer(answers: Any, answer: tuple[Any, ...]) -> None:
         pickle.dump(answer, answers)
         answers.flush()
     except OSError:
-        # nobody reads it: the parent has ended
+        # the parent, its only reader, has ended
         os._exit(0)

@@ -130,7 +130,7 @@ def write_exr(
     full_windows : bool
         Write single ghosts at the size of the picture as well (for Blender).
     attributes : mapping of str to object, optional
-        Further attributes of the first part's header, such as OpenEXR's standard ones (`standard_attributes`).
+        Further attributes of the first part's header, such as OpenEXR's standard ones (`exr_attributes`).
     one_part : bool
         Write one part with the channels of all layers, for programs that read no parts. Implies `full_windows`; if one
         layer needs 32 bits, its channels have them.
