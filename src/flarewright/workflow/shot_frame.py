@@ -10,7 +10,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, Literal
 
-from .. import __version__
+from .._version import __version__
 from ..errors import FlarewrightError, OutputError, ProjectError
 from ..io.files.text_file import digest_of
 from ..io.images.exr import read_exr, write_exr

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import ProjectError
-from ...model.project.animation import LAST_S
 from ..common import check_place, first_run_bar, one_bar, print_json, print_remarks
 from ..option_record import with_options
 from .options.record import RenderOptions
@@ -115,6 +114,7 @@ def project_of_options(
 
 def _at_moment(project: Project, options: RenderOptions) -> tuple[Project, str]:
     """Return the project of --frame or --time, and a remark that names the moment."""
+    from ...model.project.animation import LAST_S
     from ...workflow.keyframes import is_still, project_at, still, time_of
 
     if options.frame is not None and options.at_s is not None:

@@ -123,6 +123,18 @@ _COMMENTED_ART = """
 # gain = 0.5   # also: enable, tint, ramp, offset_px, offset_mm, scale, blur_px, blur_mm
 """
 
+_COMMENTED_MOTION = """
+# Values over time, for `flarewright shot`; docs/shots.md. A light has [[lights.keyframes]] and [[lights.curves]].
+# [timeline]
+# fps = 24.0
+# start = 1001   # number of the frame at 0 s
+# [[curves]]
+# of = "f_number"   # also: zoom, focus_distance, rotation_deg, gain.ghosts
+# at_s = [0.0, 2.0]
+# values = [4.0, 8.0]
+# motion = "smooth"   # default: "linear"
+"""
+
 
 def project_text(project: Project, *, folder: Path | None = None, comments: bool = False) -> str:
     """Return a project as TOML; `read_project` reads it back unchanged.
@@ -143,7 +155,9 @@ def project_text(project: Project, *, folder: Path | None = None, comments: bool
     unset_keys = _unset_keys(project) if comments else {}
     out: list[str] = []
     _emit_table(out, data, (), unset_keys, ABOUT if comments else {})
-    commented = _COMMENTED_ART if comments and project.art == Art() else ""
+    commented = _COMMENTED_MOTION if comments and not {"curves", "timeline"} & data.keys() else ""
+    if comments and project.art == Art():
+        commented = _COMMENTED_ART + commented
     if comments and project.holdout is None:
         commented = _COMMENTED_HOLDOUT + commented
     if comments and project.scatter is None:
