@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from .model import Layer as Layer
     from .model import Lens as Lens
     from .model import Light as Light
+    from .model import LightCurve as LightCurve
+    from .model import LightKey as LightKey
     from .model import Lines as Lines
     from .model import Look as Look
     from .model import Medium as Medium
@@ -54,6 +56,7 @@ if TYPE_CHECKING:
     from .model import Polygon as Polygon
     from .model import Preset as Preset
     from .model import Project as Project
+    from .model import ProjectCurve as ProjectCurve
     from .model import Quality as Quality
     from .model import QuarterWave as QuarterWave
     from .model import Rectangle as Rectangle
@@ -66,6 +69,7 @@ if TYPE_CHECKING:
     from .model import Stop as Stop
     from .model import Surface as Surface
     from .model import Tabulated as Tabulated
+    from .model import Timeline as Timeline
     from .render.analysis import ghosts as ghosts
     from .render.analysis import paraxial as paraxial
     from .render.render import Rendering as Rendering
@@ -74,15 +78,17 @@ if TYPE_CHECKING:
     from .render.scene.looks import with_look as with_look
     from .render.scene.photographic_defaults import as_photographed as as_photographed
     from .render.scene.resolve import load_lens as load_lens
+    from .workflow.shot import ShotResult as ShotResult
+    from .workflow.shot import shot as shot
 
 _HOMES = {
     ".errors": ("FlarewrightError", "GlassError", "LensError", "OutputError", "ProjectError"),
     ".model": (
         "D65", "Art", "AsLens", "Bare", "BlackBody", "Bounds", "Camera", "Coating", "CoatingChoice", "Design",
         "EqualEnergy", "Everywhere", "Film", "GhostTarget", "InTurn", "Iris",
-        "Layer", "Lens", "Light", "Lines", "Look", "Medium", "Output", "PerRow", "Polygon",
-        "Preset", "Project", "Quality", "QuarterWave", "Rectangle", "Rgb", "RowScatter", "Rule", "Scatter", "Stack",
-        "Standard", "Stop", "Surface", "Tabulated",
+        "Layer", "Lens", "Light", "LightCurve", "LightKey", "Lines", "Look", "Medium", "Output", "PerRow", "Polygon",
+        "Preset", "Project", "ProjectCurve", "Quality", "QuarterWave", "Rectangle", "Rgb", "RowScatter", "Rule",
+        "Scatter", "Stack", "Standard", "Stop", "Surface", "Tabulated", "Timeline",
     ),
     ".io.lens.coating_text": ("parse_coating_choice",),
     ".io.images.exr": ("write_exr",),
@@ -95,6 +101,7 @@ _HOMES = {
     ".render.scene.photographic_defaults": ("as_photographed",),
     ".render.scene.resolve": ("load_lens",),
     ".render.render": ("Rendering",),
+    ".workflow.shot": ("ShotResult", "shot"),
     # The package itself, which may be called: a function of its name could not live beside it.
     "": ("render",),
 }  # fmt: skip

@@ -5,7 +5,6 @@ import os
 import numpy as np
 import pytest
 
-from flarewright.editor.commands.light_path import length_s
 from flarewright.editor.commands.registry import done
 from flarewright.editor.preview.display_image import png
 from flarewright.editor.preview.render_picture import pictured
@@ -17,6 +16,7 @@ from flarewright.editor.session.session import begin
 from flarewright.errors import FlarewrightError, ProjectError
 from flarewright.io.project.project_file import read_project
 from flarewright.model import Holdout, LightKey
+from flarewright.workflow.keyframes import length_s
 
 
 def do(project, command, /, **values):

@@ -17,6 +17,21 @@ SMALL = ("--threads", "1")
 # FLARE.exr and the like are made by `prepared`
 ARGUMENTS: dict[str, tuple[str, ...]] = {
     "render": ("tessar-brendel", "--light", "5,3", "--size", "32x18", "--quality", "draft", "-o", "out.exr", "--json"),
+    "shot": (
+        "--project",
+        "shot.toml",
+        "--frames",
+        "1",
+        "--quality",
+        "draft",
+        "--size",
+        "32x18",
+        "--processes",
+        "1",
+        "-o",
+        "out.####.exr",
+        "--json",
+    ),
     "ghosts": ("tessar-brendel", "--light", "5,3", "--json"),
     "predict": ("tessar-brendel", "--samples", "5", "--quality", "draft", "--json"),
     "lenses": (),

@@ -59,6 +59,17 @@ color = [1.0, 0.4, 0.1]
 ghost = "3-1"
 move_mm = -3.0
 """
+MOVING = """
+lens = "heliar-tronnier"
+f_number = 16
+[[lights]]
+field_deg = [0, 4]
+keyframes = [ { at_s = 0.0, field_deg = [-8.0, 4.0] }, { at_s = 2.0, field_deg = [8.0, 4.0] } ]
+[camera]
+size_px = [64, 36]
+[quality]
+mode = "draft"
+"""
 SEARCH = ("--searches", "3000", "--lenses", "1", "--time", "600")
 
 
@@ -198,6 +209,10 @@ TRIALS = {
          "0.0001", "--size", "96x64", "--no-png", "-o", "out.exr"),
         ("out.exr",), ("render", "--resume", "out.state.npz", "--samples", "200000", "--error", "0.0001", "--no-png",
                        "-o", "out.exr"), "out.state.npz",
+    ),
+    "shot": Trial(
+        ("shot", "--project", "moving.toml", "--processes", "2", "-o", "out.####.exr"), ("out.*.exr",),
+        prepare=lambda folder: (folder / "moving.toml").write_text(MOVING) and None,
     ),
     "gallery": Trial(("gallery", "-o", "out", "--size", "32x18"), ("out/*.png", "out/index.html")),
     "warm-up": Trial(("warm-up",), ("cache/*/*.nbi",)),

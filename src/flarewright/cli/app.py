@@ -41,6 +41,7 @@ from .project import scene_check, scene_init, scene_schema
 from .project import schema as project_schema
 from .render import command as render
 from .render import ghosts_command as ghosts
+from .render import shot_command as shot
 
 # messages of older releases of Typer on option values
 _TYPES = {"is not a valid float": "is no number", "is not a valid integer": "is no whole number"}
@@ -67,6 +68,7 @@ design_app = typer.Typer(help="Search lenses for a target flare.")
 measure_app = typer.Typer(help="Measure a real camera's flare and replay it.")
 
 app.command("render", epilog=render.EPILOG)(render.render)
+app.command("shot", epilog=shot.EPILOG)(shot.shot)
 app.command("ghosts", epilog=ghosts.EPILOG)(ghosts.ghosts)
 app.command("predict", epilog=predict.EPILOG)(predict.predict)
 app.command("lenses", epilog=lenses.EPILOG)(lenses.lenses)
@@ -311,6 +313,8 @@ def _memory_advice(words: Sequence[str]) -> str:
             return "choose a larger --block, which makes smaller frames"
         case ["measure", _]:
             return "merge again with a larger --block, which makes smaller frames"
+        case ["shot", *_]:
+            return "choose fewer --processes or a smaller --size"
         case ["render", *_]:
             return "choose a smaller --size or fewer layers (--brightest 20)"
     return "close other programs, or choose a smaller picture"

@@ -20,6 +20,7 @@ from .lens.iris import Iris
 from .lens.plate import Plate
 from .lens.prescription import Element, Lens, Position, Row, Stop, Surface
 from .lens.scatter import RowScatter, Scatter
+from .project.animation import LightCurve, ProjectCurve, Timeline
 from .project.art import Art, Rule
 from .project.camera import Camera
 from .project.design import Bounds, Design, GhostTarget
@@ -67,6 +68,7 @@ __all__ = [
     "Layer",
     "Lens",
     "Light",
+    "LightCurve",
     "LightKey",
     "Lines",
     "Look",
@@ -78,6 +80,7 @@ __all__ = [
     "Position",
     "Preset",
     "Project",
+    "ProjectCurve",
     "Quality",
     "QuarterWave",
     "Rectangle",
@@ -94,4 +97,5 @@ __all__ = [
     "Stop",
     "Surface",
     "Tabulated",
+    "Timeline",
 ]

@@ -11,6 +11,10 @@ The command line and other front ends call these functions; nothing here prints.
 - `measured_camera`: `model_in_scene` does so for a camera of a scene; `model_errors` finds its errors
 - `project_files`: `open_project_files` opens all files of a project and collects the errors
 - `scene_check`: `camera_errors` and `light_errors` find the errors of a scene
+- `keyframes`: `project_at`, a project with the values of its keyframes and curves at a time
+- `shot`: `shot` draws the frames of a moving project on all cores, with a `ShotResult`
+- `shot_frame`: `draw_frame`, one of them, and the digest of what made it
+- `motion_blur`: `subframe_count` and `mean_layers`, the mean over the open shutter
 - `long_jobs`: `JOBS` lists the commands that can run for more than a minute, and how each keeps its partial work
 - `defaults`: default sizes of predictions
 """
@@ -32,6 +36,7 @@ if TYPE_CHECKING:
     from .measure_run import StageResult as StageResult
     from .measure_run import run_stages as run_stages
     from .project_files import open_project_files as open_project_files
+    from .shot import ShotResult as ShotResult
 
 __all__, __getattr__, __dir__ = lazy_names(
     __name__,
@@ -49,5 +54,6 @@ __all__, __getattr__, __dir__ = lazy_names(
         ".measure_provenance": ("STAGES",),
         ".measure_run": ("StageResult", "run_stages"),
         ".project_files": ("open_project_files",),
+        ".shot": ("ShotResult",),
     },
 )

@@ -53,6 +53,7 @@ JOBS = (
     LongJob(("measure", "explain"), "DIR/search.json"),
     LongJob(("predict",), "NAME.partial.npz"),
     LongJob(("render",), "NAME.partial, NAME.state.npz", "the same command, or --resume NAME.state.npz"),
+    LongJob(("shot",), "the finished frames"),
     LongJob(("gallery",), "DIR/gallery.json"),
     LongJob(("warm-up",), "the cache of compiled kernels"),
 )

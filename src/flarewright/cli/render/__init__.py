@@ -1,4 +1,4 @@
-"""Commands `flarewright render` and `flarewright ghosts`.
+"""Commands `flarewright render`, `flarewright shot` and `flarewright ghosts`.
 
 - `command`: `render`, and the files written
 - `options`: the options of `render`, a record for each section of the help page
@@ -7,5 +7,6 @@
 - `art_flags`: options for overrides: `--rule`, `--solo`, `--mute`, `--gain`, `--physical`
 - `profile_table`: `--profile`, the table of what each ghost costs
 - `preview`: the PNG: options, exposure, file
+- `shot_command`: `shot`, the frames of a moving project
 - `ghosts_command`: `ghosts`, the ghost analysis of a lens
 """

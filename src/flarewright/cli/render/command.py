@@ -53,11 +53,11 @@ def render(options: RenderOptions) -> None:
         no_png=options.no_png,
     )
     state = _read_state(options.resume)
-    flags, settings, remarks = _settings(options, state)
+    flags, settings, remarks = project_of_options(options, state)
     check_exposure(view_of, settings)
     run = _reference_run(options, settings, state)
     kept = _kept_part(options, settings)
-    _keep_inputs(
+    keep_inputs(
         settings,
         options.project,
         [options.output] if options.no_png else [options.output, options.output.with_suffix(".png")],
@@ -99,7 +99,9 @@ def render(options: RenderOptions) -> None:
         print_remarks(f"wrote {name}" for name in (files["output"], files.get("preview")) if name)
 
 
-def _settings(options: RenderOptions, state: ReferenceState | None) -> tuple[RenderOptions, Project, list[str]]:
+def project_of_options(
+    options: RenderOptions, state: ReferenceState | None
+) -> tuple[RenderOptions, Project, list[str]]:
     """Build the project that the options ask for; return them with their look, the project and remarks."""
     if options.half and options.float32:
         raise ProjectError("--half and --float both set the bits per value; keep one")
@@ -116,7 +118,36 @@ def _settings(options: RenderOptions, state: ReferenceState | None) -> tuple[Ren
     if not plain:
         settings, filled = photographed(settings, given)
         remarks = [*filled, *remarks]
+    if options.frame is not None or options.at_s is not None:
+        settings, moment = _at_moment(settings, options)
+        remarks = [moment, *remarks]
     return flags, settings, remarks
+
+
+def _at_moment(project: Project, options: RenderOptions) -> tuple[Project, str]:
+    """Return the project of --frame or --time, and a remark that names the moment."""
+    from ...model.project.animation import LAST_S
+    from ...workflow.keyframes import is_still, project_at, still, time_of
+
+    if options.frame is not None and options.at_s is not None:
+        raise ProjectError("--frame and --time both choose the moment; keep one")
+    if options.resume is not None:
+        raise ProjectError("--resume continues a picture with its settings; omit --frame and --time")
+    if is_still(project):
+        return project, "nothing in the project moves: --frame and --time have no effect"
+    if options.frame is not None:
+        at_s = time_of(options.frame, project.timeline)
+        words = f"frame {options.frame}, {at_s:g} s ({project.timeline.fps:g} frames per second)"
+    else:
+        assert options.at_s is not None
+        at_s, words = options.at_s, f"the moment {options.at_s:g} s"
+    if not 0.0 <= at_s <= LAST_S:
+        flag = "--frame" if options.frame is not None else "--time"
+        raise ProjectError(
+            f"{flag}: {at_s:g} s lies outside the time of a project, 0 to {LAST_S:g} s; the frame at 0 s is "
+            f"{project.timeline.start}"
+        )
+    return still(project_at(project, at_s)), f"{words} is drawn"
 
 
 def _without_effect(options: RenderOptions, settings: Project) -> list[str]:
@@ -132,16 +163,17 @@ def _without_effect(options: RenderOptions, settings: Project) -> list[str]:
         remarks.append("draft quality draws ghosts of two reflections only: --orders 4 is for final quality")
     if options.ringing == "collins" and settings.quality.mode != "final":
         remarks.append(f"{settings.quality.mode} quality has no rings: --ringing is for final quality")
-    moving = [k for k, light in enumerate(settings.lights) if light.keyframes]
+    moving = [f"light {k}" for k, light in enumerate(settings.lights) if light.keyframes or light.curves]
+    moving += [curve.of for curve in settings.curves]
     if moving:
-        which = f"light{'s'[: len(moving) > 1]} {', '.join(map(str, moving))}"
         remarks.append(
-            f"one frame is drawn, at field_deg; the keyframes of {which} are left out: flarewright edit plays the path"
+            f"one frame is drawn, with the plain values of the project; keys of {', '.join(moving)} are left out: "
+            "--frame N or --time S draws one of them, flarewright shot all"
         )
     return remarks
 
 
-def _keep_inputs(settings: Project, project_file: Path | None, outputs: list[Path]) -> None:
+def keep_inputs(settings: Project, project_file: Path | None, outputs: list[Path]) -> None:
     """Raise an error if an output would replace an input file."""
     read = [project_file, settings.lens if isinstance(settings.lens, str) else None]
     read += [settings.iris.mask if settings.iris is not None else None, settings.dirt.image]

@@ -13,7 +13,7 @@ from ...io.lens.coating_text import parse_coating_choice
 from ...io.lens.plate_text import parse_grating, parse_imperfection, parse_plate
 from ...io.project.project_file import ProjectFileError, read_project, validation_messages
 from ...io.project.spectrum_text import parse_spectrum
-from ...model import Art, Holdout, Iris, Lens, Light, Project, Scatter
+from ...model import Art, Holdout, Iris, Lens, Light, Project, ProjectCurve, Scatter
 from ...model.project.light import SUN_DEG
 from ..common import field_angles, pair
 from .art_flags import art_flags
@@ -120,6 +120,8 @@ def build_project(flags: RenderOptions) -> Project:
         given = {key: value for key, value in changes.items() if value is not None}
         if given:
             fields[section] = {**(dict(getattr(base, section)) if base else {}), **given}
+    if base is not None:
+        fields["curves"] = _kept_curves(flags, base)
     scatter = base.scatter if base else None
     changed = {
         "scatter": scatter_flags(flags.scatter, flags.surface_roughness, flags.cleanliness, scatter),
@@ -128,6 +130,15 @@ def build_project(flags: RenderOptions) -> Project:
     }
     fields |= {section: table for section, table in changed.items() if table is not None}
     return project_of(fields)
+
+
+def _kept_curves(flags: RenderOptions, base: Project) -> tuple[ProjectCurve, ...]:
+    """Return the project's curves without those of values that flags set: flags override a project."""
+    given = {"f_number": flags.fstop, "zoom": flags.zoom, "focus_distance": flags.focus, "rotation_deg": flags.rotation}
+    gains = [text.partition("=")[0].strip() for text in flags.gain]
+    return tuple(
+        curve for curve in base.curves if given.get(curve.of) is None and curve.of.removeprefix("gain.") not in gains
+    )
 
 
 def project_of(fields: dict[str, Any]) -> Project:
@@ -253,7 +264,12 @@ def _lights(flags: RenderOptions, base: tuple[Light, ...]) -> list[dict[str, Any
         ("spectrum", spectra),
         ("distance", [None if distance == float("inf") else distance for distance in flags.distance]),
     ):
-        _share_out(_FLAG_OF.get(name, f"--{name}"), [{name: value} for value in values], lights)
+        changes = [{name: value} for value in values]
+        _share_out(_FLAG_OF.get(name, f"--{name}"), changes, lights)
+        for light in lights if changes else ():
+            # a flag overrides the curves of its value
+            overridden = {"intensity": ("intensity",), "spectrum": ("rgb", "temperature_k")}.get(name, ())
+            light["curves"] = tuple(curve for curve in light.get("curves", ()) if curve.of not in overridden)
     _extents(flags, lights)
     return lights
 

@@ -1,43 +1,26 @@
-"""The path of a light: keyframes with linear interpolation."""
+"""The path of a light: its keyframes."""
 
 from __future__ import annotations
 
-import numpy as np
-
 from ...errors import ProjectError
 from ...model import Light, LightKey, Project
+from ...workflow.keyframes import project_at
+
+__all__ = ["STEP_S", "clear_keys", "go_to", "move_key", "remove_key", "set_key"]
 
 # time step of keys: two times within half a step belong to the same key
 STEP_S = 0.01
 
 
-def light_at(light: Light, at_s: float) -> Light:
-    """Return a light at its place at a time; a light without a path stays.
-
-    Parameters
-    ----------
-    light : Light
-    at_s : float
-        The light rests before the first key and after the last one.
-
-    Returns
-    -------
-    Light
-    """
-    if not light.keyframes:
-        return light
-    times = [key.at_s for key in light.keyframes]
-    x, y = (
-        float(np.interp(at_s, times, angles)) for angles in zip(*(k.field_deg for k in light.keyframes), strict=True)
-    )
-    placed: Light = light.replace(field_deg=(round(x, 4), round(y, 4)))
-    return placed
-
-
 def go_to(project: Project, at_s: float) -> Project:
-    """Put every light with a path at its place at a time."""
-    placed: Project = project.replace(lights=tuple(light_at(light, float(at_s)) for light in project.lights))
-    return placed
+    """Put everything that moves at its value of a time; angles are rounded for display."""
+    placed = project_at(project, float(at_s))
+    lights = (
+        light.replace(field_deg=tuple(round(angle, 4) for angle in light.field_deg)) if light.keyframes else light
+        for light in placed.lights
+    )
+    shown: Project = placed.replace(lights=tuple(lights))
+    return shown
 
 
 def set_key(project: Project, light: int, at_s: float, field_deg: list[float] | None = None) -> Project:
@@ -70,11 +53,6 @@ def clear_keys(project: Project, light: int) -> Project:
     """Remove the whole path; the light stays where it is."""
     _light(project, light)
     return _with_keys(project, light, [])
-
-
-def length_s(project: Project) -> float:
-    """Return the time of the last key of all lights; 0 without keys."""
-    return max((light.keyframes[-1].at_s for light in project.lights if light.keyframes), default=0.0)
 
 
 def _light(project: Project, light: int) -> Light:

@@ -19,6 +19,7 @@ from ...render.image.display import auto_exposure
 from ...render.preview.diagnostic_views import working_ghosts
 from ...render.scene.resolve import open_lens
 from ...typing import Pixels, Progress
+from ...workflow.keyframes import still
 from ..session.view_settings import View
 from .draft_match import EVEN, Levels, Match
 from .picture import DrawnPicture, Grade
@@ -263,9 +264,8 @@ def same_ghosts(one: Project, other: Project) -> bool:
 
 
 def pictured(project: Project) -> Project:
-    """Return the part of a project that determines its picture: without targets and light paths."""
-    lights = tuple(light.replace(keyframes=()) if light.keyframes else light for light in project.lights)
-    found: Project = project.replace(lights=lights, design=None)
+    """Return the part of a project that determines its picture: without targets, paths and curves."""
+    found: Project = still(project).replace(design=None)
     return found
 
 

@@ -10,10 +10,10 @@ from ...measure.replay.measured_project import is_measured
 from ...model import Design, Project
 from ...optics.rays.pack import preset_names
 from ...render.scene.resolve import open_lens
+from ...workflow.keyframes import length_s
 from ..commands.design_targets import ghost_target_names
 from ..commands.ghosts import override_of, soloed
 from ..commands.lens import prescription, table_of
-from ..commands.light_path import length_s
 from ..commands.shot import coating_text, iris_of
 from ..design.search_job import Solver
 from ..preview.display_image import FALSE_COLOURS, aces_available

@@ -26,7 +26,18 @@ _REMEDIES = {
     "Illegal character": "remove it, or put the text in quotes",
 }
 # tables that a file may contain several times
-_SEVERAL = ("lights", "cameras", "rows", "elements", "positions", "rules", "ghost_targets", "wishes", "keyframes")
+_SEVERAL = (
+    "lights",
+    "cameras",
+    "rows",
+    "elements",
+    "positions",
+    "rules",
+    "ghost_targets",
+    "wishes",
+    "keyframes",
+    "curves",
+)
 
 
 def toml_sentence(text: str, error: TOMLDecodeError) -> str:

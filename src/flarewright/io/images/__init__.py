@@ -2,6 +2,7 @@
 
 - `contact_sheet`: `write_contact_sheet`, small pictures on one page and in one picture
 - `exr`: `write_exr` and `read_exr` for layers; `read_exr_plane`, `read_exr_colour` for any EXR file
+- `exr_attributes`: `shot_attributes`, OpenEXR's standard attributes of a frame
 - `half`: `exr_scale`, `rounded_to_half`, scale and rounding of half floats
 - `height_image`: `read_heights`, figure errors of surfaces
 - `html_page`: `html_page`, pages and sections of pages from templates

@@ -55,6 +55,8 @@ _INTEROP_ID: Mapping[Colorspace, str] = {"rec709": "lin_rec709_scene", "acescg":
 _PREFIX = "flarewright."
 _SCALE = f"{_PREFIX}scale"
 _CHANNELS = "RGB"
+# beginnings of the names of layers of single ghosts; those of a shot have no dots
+_SINGLE = ("ghost.", "ghost_")
 
 # with less space left on the disk than this, bytes, a written file is read again
 _SPARE = 1_000_000
@@ -101,6 +103,8 @@ def write_exr(
     pixel_aspect: float = 1.0,
     colorspace: Colorspace = "rec709",
     full_windows: bool = False,
+    attributes: Mapping[str, Any] | None = None,
+    one_part: bool = False,
 ) -> tuple[str, ...]:
     """Write layers into one EXR file, atomically.
 
@@ -125,6 +129,11 @@ def write_exr(
         Primaries of the pixels; the function converts nothing.
     full_windows : bool
         Write single ghosts at the size of the picture as well (for Blender).
+    attributes : mapping of str to object, optional
+        Further attributes of the first part's header, such as OpenEXR's standard ones (`exr_attributes`).
+    one_part : bool
+        Write one part with the channels of all layers, for programs that read no parts. Implies `full_windows`; if one
+        layer needs 32 bits, its channels have them.
 
     Returns
     -------
@@ -147,16 +156,20 @@ def write_exr(
         raise FlarewrightError(f"scale {scale!r} is no power of two from 2^-63 to 2^63; give exr_scale(project)")
     if "scale" in (metadata or {}):
         raise FlarewrightError("metadata 'scale' would replace the file's own; choose another name")
-    parts = []
+    parts: list[Any] = []
+    full_windows = full_windows or one_part
     for k, layer in enumerate(layers):
         # all passes cover the picture; only single ghosts have a smaller window
-        whole = k == 0 or full_windows or not layer.name.startswith("ghost.")
+        whole = k == 0 or full_windows or not layer.name.startswith(_SINGLE)
         pixels, window = _over_picture(layer, size_px) if whole else (layer.pixels, layer.window)
         header = _header(layer, window, size_px, pixel_aspect, colorspace)
         if k == 0:
             # a project can name files whose names are not UTF-8
             header |= {f"{_PREFIX}{name}": printable(text) for name, text in (metadata or {}).items()}
+            header |= attributes or {}
         parts.append(_part(layer.name, pixels, header, scale, half=pixel_type == "half", first=k == 0))
+    if one_part:
+        parts = [_joined(parts)]
     if printable(str(path)) != str(path):
         raise OutputError(f"cannot write {shown(path)}: its name is not UTF-8; choose another name")
     write_atomically(Path(path), lambda temporary: _write_parts(parts, temporary, path))
@@ -177,6 +190,18 @@ def _part(name: str, pixels: Pixels, header: dict[str, Any], scale: float, *, ha
     # one array of three channels instead of separate planes halves the memory: "RGB" becomes R, G, B, any other name
     # becomes NAME.R, NAME.G, NAME.B
     return OpenEXR.Part(header, {"RGB" if first else name: values}, name)
+
+
+def _joined(parts: list[Any]) -> Any:
+    """Return one part with the channels of all; its header is the first one's, with lossless compression."""
+    import OpenEXR
+
+    channels = {name: channel for part in parts for name, channel in part.channels.items()}
+    header = parts[0].header | {"compression": OpenEXR.ZIP_COMPRESSION}
+    for part in parts[1:]:
+        if (scale := part.header[_SCALE]) != header[_SCALE]:
+            header[f"{_SCALE}.{part.name()}"] = scale
+    return OpenEXR.Part(header, channels, parts[0].name())
 
 
 def _write_parts(parts: list[Any], temporary: Path, path: str | PathLike[str]) -> None:
@@ -230,16 +255,25 @@ def _contents(file: Any) -> ExrContents:
     scales = [_scale(part) for part in file.parts]
     layers = []
     for k, (part, scale) in enumerate(zip(file.parts, scales, strict=True)):
-        prefix = "" if k == 0 else f"{part.name()}."
-        planes = [part.channels[f"{prefix}{name}"].pixels for name in _CHANNELS]
-        pixels = _unscaled(np.stack(planes, axis=-1).astype(np.float32, copy=False), scale)
+        groups = [("", part.name() or "beauty")] if k == 0 else [(f"{part.name()}.", part.name())]
+        if len(file.parts) == 1:
+            # a file that `one_part` wrote
+            below = dict.fromkeys(name.rpartition(".")[0] for name in part.channels if "." in name)
+            groups += [(f"{name}.", name) for name in below]
         x, y = (int(value) for value in part.header["dataWindow"][0])
         about = _prefixed(part.header, f"{_PREFIX}layer.")
-        name = part.name() or "beauty"
-        layers.append(Layer(name, pixels, (x, y, pixels.shape[1], pixels.shape[0]), about))
+        for prefix, name in groups:
+            planes = [part.channels[f"{prefix}{channel}"].pixels for channel in _CHANNELS]
+            by = part.header.get(f"{_SCALE}.{name}", scale)
+            pixels = _unscaled(np.stack(planes, axis=-1).astype(np.float32, copy=False), by)
+            layers.append(
+                Layer(name, pixels, (x, y, pixels.shape[1], pixels.shape[0]), about if k or not prefix else {})
+            )
     header = dict(file.parts[0].header)
     low, high = header["displayWindow"]
-    ours = {k: v for k, v in header.items() if k != _SCALE and not k.startswith(f"{_PREFIX}layer.")}
+    ours = {
+        k: v for k, v in header.items() if not f"{k}.".startswith(f"{_SCALE}.") and not k.startswith(f"{_PREFIX}layer.")
+    }
     metadata = {k: str(v) for k, v in _prefixed(ours, _PREFIX).items()}
     kind: Literal["half", "float"] = "half" if file.parts[0].channels["R"].pixels.dtype == np.float16 else "float"
     size = (int(high[0] - low[0]) + 1, int(high[1] - low[1]) + 1)

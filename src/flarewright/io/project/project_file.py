@@ -28,6 +28,7 @@ from ...model.lens.imperfection import Imperfection
 from ...model.lens.iris import Iris
 from ...model.lens.plate import Plate
 from ...model.lens.prescription import Lens, Surface
+from ...model.project import animation as animations
 from ...model.project import art as arts
 from ...model.project import design as designs
 from ...model.project import light as lights
@@ -277,6 +278,8 @@ _SECTIONS: Sections = {
     "output": (Output,),
     "lights": (lights.Light,),
     "keyframes": (lights.LightKey,),
+    "curves": (animations.LightCurve,),
+    "timeline": (animations.Timeline,),
     "shape": (lights.Rectangle, lights.Polygon),
     "filter": (Plate,),
     "cover_glass": (Plate,),

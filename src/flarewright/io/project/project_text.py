@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from ...errors import ProjectError
-from ...model import Art, Dirt, Light, Starburst
+from ...model import Art, Dirt, Light, Starburst, Timeline
 from ...model.project import project as choices
 from ...model.project.project import CoatingChoice, Project
 from ..lens.coating_text import UNCOATED, format_coating
@@ -43,6 +43,9 @@ ABOUT = {
     "lights.distance": "2000.0   # mm in front of the first vertex; default: infinity",
     "lights.shape": '{ kind = "rectangle", size_deg = [4.0, 3.0], rotation_deg = 15.0 }   # or "polygon", corners_deg',
     "lights.holdout": '{ image = "leaves.png", invert = true }   # hides only this light',
+    "lights.motion": '"linear" or "smooth", between keyframes',
+    "timeline.fps": "frames per second of a shot",
+    "timeline.start": "number of the frame at 0 s",
     "lights.intensity": "irradiance on a plane that faces the light",
     "lights.diameter_deg": "angular diameter: 0.53 for the sun, 0 for a point",
     "iris.roughness_um": "rms roughness of the blade edges",
@@ -120,6 +123,18 @@ _COMMENTED_ART = """
 # gain = 0.5   # also: enable, tint, ramp, offset_px, offset_mm, scale, blur_px, blur_mm
 """
 
+_COMMENTED_MOTION = """
+# Values over time, for `flarewright shot`; docs/shots.md. A light has [[lights.keyframes]] and [[lights.curves]].
+# [timeline]
+# fps = 24.0
+# start = 1001   # number of the frame at 0 s
+# [[curves]]
+# of = "f_number"   # also: zoom, focus_distance, rotation_deg, gain.ghosts
+# at_s = [0.0, 2.0]
+# values = [4.0, 8.0]
+# motion = "smooth"   # default: "linear"
+"""
+
 
 def project_text(project: Project, *, folder: Path | None = None, comments: bool = False) -> str:
     """Return a project as TOML; `read_project` reads it back unchanged.
@@ -140,7 +155,9 @@ def project_text(project: Project, *, folder: Path | None = None, comments: bool
     unset_keys = _unset_keys(project) if comments else {}
     out: list[str] = []
     _emit_table(out, data, (), unset_keys, ABOUT if comments else {})
-    commented = _COMMENTED_ART if comments and project.art == Art() else ""
+    commented = _COMMENTED_MOTION if comments and not {"curves", "timeline"} & data.keys() else ""
+    if comments and project.art == Art():
+        commented = _COMMENTED_ART + commented
     if comments and project.holdout is None:
         commented = _COMMENTED_HOLDOUT + commented
     if comments and project.scatter is None:
@@ -188,7 +205,13 @@ def project_data(project: Project, folder: Path | None = None) -> dict[str, Any]
     for written, light in zip(data["lights"], project.lights, strict=True):
         written["spectrum"] = spectrum_text(light.spectrum) or written["spectrum"]
         if not light.keyframes:
-            del written["keyframes"]
+            del written["keyframes"], written["motion"]
+        if not light.curves:
+            del written["curves"]
+    if not project.curves:
+        del data["curves"]
+    if project.timeline == Timeline():
+        del data["timeline"]
     return data
 
 

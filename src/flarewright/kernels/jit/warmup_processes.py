@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -134,16 +134,38 @@ def start(share: Sequence[str]) -> subprocess.Popen[bytes]:
     OSError
         If no process can be started.
     """
+    called = f"from {__package__}.warmup import run_helper; run_helper({list(share)!r})"
+    return start_python(called, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def start_python(
+    called: str, *, stdout: int | None = None, stderr: int | None = None, environment: Mapping[str, str] | None = None
+) -> subprocess.Popen[bytes]:
+    """Start an interpreter that runs a statement, with a pipe to its stdin, which ends when this process ends.
+
+    Parameters
+    ----------
+    called : str
+        One or several statements; they can import what this process can.
+    stdout, stderr : int, optional
+        As of `subprocess.Popen`.
+    environment : mapping of str to str, optional
+        Added to that of this process.
+
+    Raises
+    ------
+    OSError
+        If no process can be started.
+    """
     if getattr(sys, "frozen", False) or not sys.executable:
         raise OSError("no Python interpreter to start a helper process with")
     # use the parent's search path, not the working folder that `-c` adds
-    called = f"from {__package__}.warmup import run_helper; run_helper({list(share)!r})"
     code = f"import sys; sys.path[:] = {sys.path!r}; {called}"
     return subprocess.Popen(
         [sys.executable, "-c", code],
         stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        env={**os.environ, _MARK: "1"},
+        stdout=stdout,
+        stderr=stderr,
+        env={**os.environ, **(environment or {}), _MARK: "1"},
         creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
     )

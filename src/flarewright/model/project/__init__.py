@@ -2,6 +2,7 @@
 
 `flarewright.model` re-exports most public records.
 
+- `animation`: `Curve`, a value over time, and `Timeline`, the frames of a shot
 - `art`: `Art` and its `Rule`, art direction
 - `camera`: `Camera`, sensor and picture size
 - `design`: `Design`, `Bounds`, `GhostTarget`, settings of the lens design

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ..base import Frozen
+from .animation import LARGEST_INTENSITY, LAST_S, LightCurve, Motion, one_curve_each
 from .holdout import Holdout
 
 
@@ -76,8 +77,6 @@ Spectrum = Annotated[EqualEnergy | D65 | BlackBody | Lines | Tabulated | Rgb, Fi
 LEAST_LIGHT_DEG = 1e-6
 """Least diameter or width of a light that is no point, degrees: a 50 mm lens images it 1 nm wide."""
 
-LARGEST_INTENSITY = 1e20
-"""Largest intensity: above that of every light, and its products stay within 32-bit floats."""
 SUN_DEG = 0.53
 """Angular diameter of the sun, degrees."""
 
@@ -124,7 +123,7 @@ Shape = Annotated[Rectangle | Polygon, Field(discriminator="kind")]
 class LightKey(Frozen):
     """Position of a light at one time, seconds."""
 
-    at_s: float = Field(ge=0.0, le=86400.0)
+    at_s: float = Field(ge=0.0, le=LAST_S)
     field_deg: FieldAngles
 
 
@@ -150,8 +149,11 @@ class Light(Frozen):
     holdout : Holdout or None
         Holdout of this light, in addition to the project's.
     keyframes : tuple of LightKey
-        Animation in the editor: ascending times, field angles linear between them. A render draws the light at
-        `field_deg`.
+        The light's path in a shot: ascending times. A render without a time draws the light at `field_deg`.
+    motion : {"linear", "smooth"}
+        Interpolation of the path.
+    curves : tuple of LightCurve
+        Intensity and colour in a shot.
     """
 
     name: str = "light"
@@ -163,6 +165,8 @@ class Light(Frozen):
     shape: Shape | None = None
     holdout: Holdout | None = None
     keyframes: tuple[LightKey, ...] = Field((), max_length=1000)
+    motion: Motion = "linear"
+    curves: tuple[LightCurve, ...] = ()
 
     @field_validator("diameter_deg")
     @classmethod
@@ -185,6 +189,12 @@ class Light(Frozen):
             if after <= before:
                 raise ValueError(f"keyframes must rise in time: {after:g} s follows {before:g} s")
         return keyframes
+
+    @field_validator("curves")
+    @classmethod
+    def _one_curve_each(cls, curves: tuple[LightCurve, ...]) -> tuple[LightCurve, ...]:
+        one_curve_each(curves)
+        return curves
 
     @property
     def extended(self) -> bool:

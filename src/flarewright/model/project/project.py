@@ -13,6 +13,7 @@ from ..lens.iris import Iris
 from ..lens.plate import Plate
 from ..lens.prescription import LARGEST_F_NUMBER, LEAST_F_NUMBER, Lens
 from ..lens.scatter import Scatter
+from .animation import ProjectCurve, Timeline, one_curve_each
 from .art import Art
 from .camera import Camera, Colorspace
 from .design import Design
@@ -186,6 +187,10 @@ class Project(Frozen):
         Art direction; none by default.
     design : Design or None
         Settings of `flarewright design`; a render ignores them.
+    curves : tuple of ProjectCurve
+        Values over time, for a shot; a render without a time ignores them.
+    timeline : Timeline
+        Frames per second of a shot, and the number of its frame at 0 s.
     """
 
     schema_version: Literal[1] = 1
@@ -206,6 +211,8 @@ class Project(Frozen):
     holdout: Holdout | None = None
     art: Art = Art()
     design: Design | None = None
+    curves: tuple[ProjectCurve, ...] = ()
+    timeline: Timeline = Timeline()
 
     @field_validator("coating", mode="before")
     @classmethod
@@ -216,6 +223,12 @@ class Project(Frozen):
                 "flarewright.render next to the project"
             )
         return everywhere(coating)
+
+    @field_validator("curves")
+    @classmethod
+    def _one_curve_each(cls, curves: tuple[ProjectCurve, ...]) -> tuple[ProjectCurve, ...]:
+        one_curve_each(curves)
+        return curves
 
     @field_validator("zoom")
     @classmethod

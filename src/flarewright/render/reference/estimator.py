@@ -226,7 +226,10 @@ def _fingerprints(settled: ResolvedProject, shots: Sequence[Shot], rays: Referen
         "distance of the sensor": packed.sensor_z,
         "iris": [settled.iris.model_dump(mode="json", exclude={"mask"}), _digest(opening.mask)],
         "coating": project.coating.model_dump(mode="json"),
-        "light": [light.model_dump(mode="json", exclude={"holdout", "keyframes"}) for light in project.lights],
+        "light": [
+            light.model_dump(mode="json", exclude={"holdout", "keyframes", "motion", "curves"})
+            for light in project.lights
+        ],
         # digest the result, not the files
         "holdout": [[shot.light.field_deg, shot.share, _digest(shot.border)] for shot in shots] if hidden else None,
         "picture": [project.camera.size_px, project.camera.sensor, project.output.colorspace],

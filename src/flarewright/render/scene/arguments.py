@@ -26,9 +26,11 @@ if TYPE_CHECKING:
         Light,
         Output,
         Plate,
+        ProjectCurve,
         Quality,
         Scatter,
         Starburst,
+        Timeline,
     )
 
 P = ParamSpec("P")
@@ -54,6 +56,8 @@ class Settings(TypedDict, total=False):
     holdout: Holdout | None
     art: Art
     design: Design | None
+    curves: Sequence[ProjectCurve]
+    timeline: Timeline
 
 
 def project_of(given: Project | Lens | str | PathLike[str], **settings: Unpack[Settings]) -> Project:

@@ -1,4 +1,4 @@
-"""The options of `flarewright render`, a record for each section of its help page.
+"""The options of `flarewright render` and `flarewright shot`, a record for each section of their help pages.
 
 - `light`: the lights, and what hides them
 - `lens`: the lens: aperture, iris, coating, scatter, zoom, filters
@@ -9,5 +9,6 @@
 - `reference`: reference quality: errors, samples, time
 - `starburst`: dirt in the pupil and its effect on the starburst
 - `inputs`: what is rendered: a lens or a measured flare, a project, a look
+- `shot`: `ShotOptions`, all of `flarewright shot`
 - `record`: `RenderOptions`, all of them together
 """

@@ -26,3 +26,7 @@ class InputOptions:
             help="Coatings, iris, dirt and light colours of one of `flarewright looks`; flags override it.",
         ),
     ] = None
+    frame: Annotated[int | None, typer.Option(help="Draw this frame of a project that moves.")] = None
+    at_s: Annotated[
+        float | None, typer.Option("--time", metavar="SECONDS", help="Draw this moment of a project that moves.")
+    ] = None

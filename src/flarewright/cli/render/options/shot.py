@@ -1,0 +1,128 @@
+"""All options of `flarewright shot`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .art import ArtOptions
+from .camera import CameraOptions
+from .lens import LensOptions
+from .light import LightOptions
+from .quality import QualityOptions
+from .starburst import StarburstOptions
+
+PANEL = "Output"
+FRAMES = "Frames"
+WORK = "Processes"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShotInputs:
+    """What is drawn, and which frames of it. None or empty: not given."""
+
+    project: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A project file; flags override its settings.")
+    ] = None
+    lens: Annotated[
+        str | None, typer.Option(metavar="LENS", help="A shipped lens, a lens file, or a measured flare (.json).")
+    ] = None
+    look: Annotated[
+        str | None, typer.Option(metavar="NAME|FILE", help="One of `flarewright looks`; flags override it.")
+    ] = None
+    frames: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A-BxS", help="1001-1240, 1001-1240x2 or 1,5,9-12 (default: to the last key).",
+            rich_help_panel=FRAMES,
+        ),
+    ] = None  # fmt: skip
+    fps: Annotated[
+        float | None, typer.Option(help="Frames per second (default: the project's, 24).", rich_help_panel=FRAMES)
+    ] = None
+    start: Annotated[
+        int | None, typer.Option(help="Number of the frame at 0 s (default: the project's, 1).", rich_help_panel=FRAMES)
+    ] = None
+    shutter: Annotated[
+        float,
+        typer.Option(
+            metavar="DEGREES", help="Motion blur: 180 is open for half a frame (default: 0, none).",
+            rich_help_panel=FRAMES,
+        ),
+    ] = 0.0  # fmt: skip
+    subframes: Annotated[
+        int | None,
+        typer.Option(help="Moments averaged in a frame (default: one per pixel of motion).", rich_help_panel=FRAMES),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShotOutput:
+    """What is written, and by how many processes. None or empty: not given."""
+
+    output: Annotated[
+        str,
+        typer.Option(
+            "-o", "--output", metavar="NAME.####.exr", help="EXR files: ####, %04d or $F4 is the frame.",
+            rich_help_panel=PANEL,
+        ),
+    ]  # fmt: skip
+    layers: Annotated[
+        str | None,
+        typer.Option(
+            help="Layers: beauty; passes: also starburst, ghosts; ghosts: also each ghost.", rich_help_panel=PANEL
+        ),
+    ] = None
+    brightest: Annotated[
+        int | None,
+        typer.Option(help="Largest number of single ghosts to write, brightest first.", rich_help_panel=PANEL),
+    ] = None
+    no_starburst: Annotated[
+        bool, typer.Option("--no-starburst", help="Omit the light's direct image.", rich_help_panel=PANEL)
+    ] = False
+    colorspace: Annotated[
+        str | None, typer.Option(help="Colour space, linear: rec709 or acescg.", rich_help_panel=PANEL)
+    ] = None
+    gamut: Annotated[
+        str | None,
+        typer.Option(help="keep negative channels (default), or compress colours.", rich_help_panel=PANEL),
+    ] = None
+    half: Annotated[bool, typer.Option("--half", help="Write 16 bits per value (default).", rich_help_panel=PANEL)] = (
+        False
+    )
+    float32: Annotated[
+        bool, typer.Option("--float", help="Write 32 bits per value, unscaled irradiances.", rich_help_panel=PANEL)
+    ] = False
+    parts: Annotated[
+        str | None,
+        typer.Option(
+            help="multi: a part of the file per layer (default); single: one part with all.", rich_help_panel=PANEL
+        ),
+    ] = None
+    cropped: Annotated[
+        bool, typer.Option("--cropped", help="Write single ghosts in small data windows.", rich_help_panel=PANEL)
+    ] = False
+    processes: Annotated[
+        int | None,
+        typer.Option(min=1, help="Number of processes (default: one per core).", rich_help_panel=WORK),
+    ] = None
+    chunk: Annotated[
+        str | None,
+        typer.Option(metavar="I/N", help="Draw part I of N of the frames, for render farms.", rich_help_panel=WORK),
+    ] = None
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print a summary as one JSON object.", rich_help_panel=WORK)
+    ] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShotOptions(
+    QualityOptions, CameraOptions, ArtOptions, StarburstOptions, LensOptions, LightOptions, ShotOutput, ShotInputs
+):
+    """The options as given; the last base comes first on the help page."""
+
+    resumed: Any = None
+    """A `Project` that a look has made."""

@@ -1,0 +1,202 @@
+"""Share independent items among processes."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from threading import Lock, Thread
+from typing import Any
+
+from ..errors import FlarewrightError
+from ..kernels.jit.warmup_processes import cores, start_python
+from .worker import named
+
+# time that a process gets to write its present result when it has to end
+_PATIENCE_S = 10.0
+# libraries that read their number of threads from the environment when they are imported
+_THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Done:
+    """A finished item.
+
+    Attributes
+    ----------
+    item : object
+    result : object
+        What the function returned.
+    """
+
+    item: Any
+    result: Any
+
+
+def shares(items: int, processes: int | None = None, threads: int | None = None) -> tuple[int, int]:
+    """Return how many processes work off items, and the threads of each, so that the machine is not oversubscribed.
+
+    Parameters
+    ----------
+    items : int
+    processes : int, optional
+        None: one a core. Never more than items.
+    threads : int, optional
+        Threads of all processes together; None: the cores.
+
+    Returns
+    -------
+    tuple of int
+
+    Examples
+    --------
+    >>> shares(100, processes=4, threads=8), shares(1, processes=4, threads=8)
+    ((4, 2), (1, 8))
+    """
+    all_threads = threads or cores()
+    number = max(1, min(processes or all_threads, items))
+    return number, max(1, all_threads // number)
+
+
+def work_off(
+    function: str,
+    context: Any,
+    items: Sequence[Any],
+    *,
+    processes: int = 1,
+    threads: int | None = None,
+    what: str = "item",
+) -> Iterator[Done]:
+    """Call a function for each item, and yield the results as they come.
+
+    Parameters
+    ----------
+    function : str
+        "module:name" of a function of (context, item, threads). Its result must not depend on the process, the order or
+        the threads.
+    context : object
+        First argument of all calls; sent to each process once, as a pickle.
+    items : sequence
+    processes : int
+        1: in this process. More: new interpreters (on every system, never a copy of this process) that keep what they
+        have loaded for all their items, and end with the iterator or with this process.
+    threads : int, optional
+        Threads of each process; None: all cores.
+    what : str
+        What an item is, for messages.
+
+    Yields
+    ------
+    Done
+        In the order in which items are finished.
+
+    Raises
+    ------
+    FlarewrightError
+        The function raised one for an item, or a process was lost; results before it are valid.
+    MemoryError
+        A process has no memory for an item.
+    RuntimeError
+        Any other exception of the function, with its traceback.
+    """
+    if processes == 1:
+        call = named(function)
+        for item in items:
+            yield Done(item, call(context, item, threads))
+        return
+    answers: SimpleQueue[tuple[Any, tuple[Any, ...]]] = SimpleQueue()
+    todo, lock = iter(items), Lock()
+    first = (function, context, threads)
+    started: list[subprocess.Popen[bytes]] = []
+    try:
+        for _ in range(min(processes, len(items))):
+            process = _start(threads)
+            started.append(process)
+            Thread(target=_attend, args=(process, first, todo, lock, answers), daemon=True).start()
+        for _ in items:
+            item, answer = _next(answers)
+            yield Done(item, _result(item, answer, what))
+    finally:
+        _end(started)
+
+
+def _start(threads: int | None) -> subprocess.Popen[bytes]:
+    code = f"from {__package__}.worker import serve; serve()"
+    number = {} if threads is None else dict.fromkeys(_THREADS, str(threads))
+    try:
+        return start_python(code, stdout=subprocess.PIPE, environment=number)
+    except (OSError, ValueError) as error:
+        raise FlarewrightError(f"no further process can be started ({error}); give fewer --processes") from None
+
+
+def _attend(
+    process: subprocess.Popen[bytes],
+    first: Any,
+    todo: Iterator[Any],
+    lock: Lock,
+    answers: SimpleQueue[tuple[Any, tuple[Any, ...]]],
+) -> None:
+    """Feed one process; queue its answers, or that it was lost."""
+    assert process.stdin is not None
+    assert process.stdout is not None
+    item = None
+    try:
+        pickle.dump(first, process.stdin)
+        while True:
+            with lock:
+                item = next(todo)
+            pickle.dump(item, process.stdin)
+            process.stdin.flush()
+            answers.put((item, pickle.load(process.stdout)))
+    except StopIteration:
+        pass
+    # a process that was killed while it answered leaves half a pickle
+    except (OSError, EOFError, ValueError, pickle.UnpicklingError):
+        answers.put((item, ("lost", process)))
+
+
+def _next(answers: SimpleQueue[tuple[Any, tuple[Any, ...]]]) -> tuple[Any, tuple[Any, ...]]:
+    """Wait for an answer; with pauses, because some systems deliver Ctrl-C only between calls."""
+    while True:
+        with suppress(Empty):
+            return answers.get(timeout=0.5)
+
+
+def _result(item: Any, answer: tuple[Any, ...], what: str) -> Any:
+    """Return the result in an answer, or raise its error."""
+    match answer:
+        case ("done", result):
+            return result
+        case ("refused", sentence, problems):
+            raise FlarewrightError(sentence, problems)
+        case ("memory",):
+            raise MemoryError
+        case ("lost", process):
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(1.0)
+            code = process.returncode
+            how = f"by signal {-code}" if code is not None and code < 0 else f"with exit code {code}"
+            where = "before its first work" if item is None else f"at {what} {item}"
+            raise FlarewrightError(
+                f"a process ended {how} {where}, perhaps for lack of memory; finished work is kept: repeat the "
+                "command, with fewer --processes"
+            )
+        case _:
+            raise RuntimeError(f"{what} {item}: {answer[-1]}")
+
+
+def _end(started: Sequence[subprocess.Popen[bytes]]) -> None:
+    """End processes: closing their stdin lets each finish what it writes."""
+    for process in started:
+        with suppress(OSError):
+            if process.stdin is not None:
+                process.stdin.close()
+    for process in started:
+        try:
+            process.wait(_PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()

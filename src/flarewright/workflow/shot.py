@@ -1,0 +1,237 @@
+"""Draw a shot: a list of frames that do not depend on each other."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from ..errors import FlarewrightError, OutputError, ProjectError
+from ..jobs.frame_list import FramePattern, chunk_of, frames_text, parse_chunk, parse_frames
+from ..jobs.processes import shares, work_off
+from ..model import Project
+from .keyframes import frame_rate, is_still, length_s, time_of
+
+if TYPE_CHECKING:
+    from .shot_frame import FrameResult, ShotPlan
+
+__all__ = ["ShotResult", "shot", "shot_frames"]
+
+_DRAW = "flarewright.workflow.shot_frame:draw_frame"
+# remarks that are kept; each frame can have some
+_MOST_REMARKS = 20
+# memory of a process: that of a tiny picture, and some 20 layers per pixel while one is drawn and written
+_PROCESS_BYTES, _PIXEL_BYTES = 300_000_000, 240
+
+
+@dataclass(frozen=True)
+class ShotResult:
+    """What became of a shot.
+
+    Attributes
+    ----------
+    frames : tuple of FrameResult
+        In the order of their numbers.
+    remarks : tuple of str
+        About the shot and its frames, each once.
+    processes : int
+    """
+
+    frames: tuple[FrameResult, ...]
+    remarks: tuple[str, ...]
+    processes: int
+
+
+def shot(
+    project: Project,
+    output: str | os.PathLike[str],
+    *,
+    frames: str | Sequence[int] | None = None,
+    shutter_deg: float = 0.0,
+    subframes: int | None = None,
+    parts: Literal["multi", "single"] = "multi",
+    cropped: bool = False,
+    chunk: str | None = None,
+    processes: int | None = None,
+    threads: int | None = None,
+    report: Callable[[FrameResult, int, int], None] | None = None,
+    prepare: Callable[[Project, int], None] | None = None,
+) -> ShotResult:
+    """Draw frames of a project whose values change over time, and write a file for each.
+
+    Files that the same settings and version have made are kept, so that a repeated call resumes. The bytes of a file do
+    not depend on the other frames, their order, the chunks, processes or threads.
+
+    Parameters
+    ----------
+    project : Project
+        With keyframes and curves; `Project.timeline` has the frames per second and the number of the frame at 0 s.
+    output : path
+        EXR files, with a place for the number of the frame: "flare.####.exr", "flare.%04d.exr" or "flare.$F4.exr".
+    frames : str or sequence of int, optional
+        "1001-1240", "1001-1240x2", "1,5,9-12", or numbers. None: from the frame at 0 s to the last key.
+    shutter_deg : float
+        Motion blur: 180 is open for half the time of a frame, around its moment; 0: none.
+    subframes : int, optional
+        Moments whose mean is a frame. None: as many as the flare moves pixels, 5 to 64.
+    parts : {"multi", "single"}
+        One part of the file for each layer, or one part with the channels of all.
+    cropped : bool
+        Single ghosts have their own data windows instead of the picture's.
+    chunk : str, optional
+        "2/5": draw only the second of five parts of the list.
+    processes : int, optional
+        None: one a core, as the memory allows.
+    threads : int, optional
+        Threads of all processes together; None: the cores.
+    report : callable, optional
+        Called after each frame with its result, the number of finished frames and the number of all.
+    prepare : callable, optional
+        Called once with the first frame's project and the number of threads, before processes start: the command line
+        compiles kernels here.
+
+    Returns
+    -------
+    ShotResult
+
+    Raises
+    ------
+    FlarewrightError
+        The frames, the file name or the project cannot be used, a file cannot be written, or a process was lost.
+    MemoryError
+        There is too little memory for a frame.
+
+    Examples
+    --------
+    >>> from flarewright import Light, Project, shot
+    >>> from flarewright.model import LightKey
+    >>> path = (LightKey(at_s=0, field_deg=(-12, 4)), LightKey(at_s=1, field_deg=(12, 4)))
+    >>> moving = Project(lens="heliar-tronnier", lights=[Light(field_deg=(0, 4), keyframes=path)])
+    >>> shot(moving, "flare.####.exr", frames="1-25", shutter_deg=180)               # doctest: +SKIP
+    """
+    from .shot_frame import ShotPlan, frame_project
+
+    _check(shutter_deg, subframes)
+    pattern = FramePattern(os.fspath(output))
+    numbers, remarks = shot_frames(project, frames)
+    pattern.check(numbers)
+    _check_output(pattern)
+    plan = ShotPlan(project, pattern.text, shutter_deg, subframes, parts, cropped)
+    mine = numbers if chunk is None else chunk_of(numbers, *parse_chunk(chunk))
+    if shutter_deg == 0.0 and subframes is not None and subframes > 1:
+        remarks.append("sub-frames have no effect without an open shutter: give its angle, such as 180 degrees")
+    if not mine:
+        return ShotResult((), (*remarks, f"chunk {chunk} of {len(numbers)} frames is empty"), 0)
+    _check_moments(plan, mine)
+    number, each = shares(len(mine), processes if processes is not None else _fitting(plan), threads)
+    if prepare is not None:
+        for frame in {mine[0], mine[len(mine) // 2], mine[-1]}:
+            prepare(frame_project(plan, time_of(frame, project.timeline)), number * each)
+    done: list[FrameResult] = []
+    for one in work_off(_DRAW, plan, mine, processes=number, threads=each, what="frame"):
+        done.append(one.result)
+        if report is not None:
+            report(one.result, len(done), len(mine))
+    done.sort(key=lambda result: result.frame)
+    return ShotResult(tuple(done), (*remarks, *_remarks(done)), number)
+
+
+def shot_frames(project: Project, frames: str | Sequence[int] | None) -> tuple[tuple[int, ...], list[str]]:
+    """Return the numbers of a shot's frames, and remarks on them.
+
+    Parameters
+    ----------
+    project : Project
+    frames : str or sequence of int, optional
+        As of `shot`.
+
+    Raises
+    ------
+    ProjectError
+        There are none, or all of them lie outside the time in which the project moves.
+    """
+    timeline, long_s = project.timeline, length_s(project)
+    last = timeline.start + ceil(long_s * float(frame_rate(timeline.fps)) - 1e-6)
+    if frames is None:
+        if is_still(project):
+            raise ProjectError("nothing in the project moves, so it has no last frame; give the frames, such as 1-24")
+        return tuple(range(timeline.start, last + 1)), []
+    numbers = parse_frames(frames) if isinstance(frames, str) else tuple(sorted(set(frames)))
+    if not numbers:
+        raise ProjectError("the list of frames is empty; give at least one, such as 1-24")
+    if is_still(project):
+        alike = "nothing in the project moves: all frames are alike"
+        return numbers, [alike] if len(numbers) > 1 else []
+    outside = [frame for frame in numbers if not timeline.start <= frame <= last]
+    if len(outside) == len(numbers):
+        raise ProjectError(
+            f"frames {frames_text(numbers)[:80]} lie outside the project's {timeline.start}-{last} (frame "
+            f"{timeline.start} is at 0 s, the last key at {long_s:g} s); give frames inside, or start={numbers[0]}, "
+            "the number of the frame at 0 s"
+        )
+    if not outside:
+        return numbers, []
+    which = f"frames {frames_text(outside)[:80]} lie" if len(outside) > 1 else f"frame {outside[0]} lies"
+    return numbers, [f"{which} outside the keys, {timeline.start}-{last}: everything rests there"]
+
+
+def _remarks(done: Sequence[FrameResult]) -> list[str]:
+    """Return the remarks on frames, each once, with the frames if they are not all that were drawn."""
+    by: dict[str, list[int]] = {}
+    for result in done:
+        for line in result.remarks:
+            by.setdefault(line, []).append(result.frame)
+    drawn = sum(result.drawn for result in done)
+    found = []
+    for line, frames in by.items():
+        which = f"frame{'s'[: len(frames) > 1]} {frames_text(frames)[:80]}: "
+        found.append(line if len(frames) == drawn > 1 else which + line)
+    more = len(found) - _MOST_REMARKS
+    return [*found[:_MOST_REMARKS], f"and {more} more remarks on single frames"] if more > 0 else found
+
+
+def _check(shutter_deg: float, subframes: int | None) -> None:
+    if not 0.0 <= shutter_deg <= 360.0:
+        raise ProjectError(f"a shutter of {shutter_deg:g} degrees does not exist; give 0 to 360, 180 is usual")
+    if subframes is not None and not 1 <= subframes <= 1000:
+        raise ProjectError(f"{subframes} sub-frames are not possible; give 1 to 1000")
+
+
+def _check_output(pattern: FramePattern) -> None:
+    """Raise an error before the work if the files cannot be written."""
+    path = Path(pattern.text)
+    if path.suffix.lower() != ".exr":
+        raise OutputError(f"the output {pattern.text!r} must be named *.exr, such as flare.####.exr")
+    if not path.parent.is_dir():
+        raise OutputError(f"cannot write {path}: the folder {path.parent} does not exist; create it first")
+
+
+def _check_moments(plan: ShotPlan, frames: Sequence[int]) -> None:
+    """Raise an error now for values that cannot be used together at the first or last frame or at a key."""
+    from ..measure.replay.measured_project import is_measured
+    from ..render.scene.resolve import resolve_project
+    from .shot_frame import frame_project
+
+    project = plan.project
+    times = {time_of(frames[0], project.timeline), time_of(frames[-1], project.timeline)}
+    times |= {at_s for curve in project.curves for at_s in curve.at_s}
+    for at_s in sorted(times):
+        moment = frame_project(plan, at_s)
+        try:
+            if not is_measured(moment):
+                resolve_project(moment)
+        except FlarewrightError as error:
+            raise type(error)(f"at {at_s:g} s: {error}" if at_s else str(error), error.problems) from None
+
+
+def _fitting(plan: ShotPlan) -> int:
+    """Return how many processes the cores and the free memory allow."""
+    from ..kernels.jit.warmup_processes import cores
+    from ..render.scene.memory_check import spare_bytes
+
+    width, height = plan.project.camera.size_px
+    each = _PROCESS_BYTES + width * height * _PIXEL_BYTES
+    return max(1, int(min(cores(), spare_bytes() / each)))

@@ -1,0 +1,286 @@
+"""One frame of a shot: the project at its time, drawn, averaged over the open shutter, and written."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Literal
+
+from .._version import __version__
+from ..errors import FlarewrightError, OutputError, ProjectError
+from ..io.files.text_file import digest_of
+from ..io.images.exr import read_exr, write_exr
+from ..io.images.exr_attributes import shot_attributes
+from ..io.images.half import half_scale
+from ..io.project.project_file import project_text
+from ..jobs.frame_list import FramePattern
+from ..jobs.worker import WRITING
+from ..measure.replay.measured_project import is_measured, render_measured
+from ..model import Layer, Project
+from ..render.render import Rendering
+from ..render.render import render as render_project
+from ..render.scene.resolve import open_lens, resolve_project
+from .keyframes import frame_rate, peak_intensity, project_at, still, time_of
+from .motion_blur import mean_layers, subframe_count, subframe_times
+
+__all__ = ["FrameResult", "ShotPlan", "draw_frame", "frame_project", "part_name"]
+
+# samples over the open shutter from which the number of sub-frames is chosen
+_SAMPLES = 5
+
+
+@dataclass(frozen=True)
+class ShotPlan:
+    """What all frames of a shot share; with a frame's number it determines the bytes of its file.
+
+    Attributes
+    ----------
+    project : Project
+        With its keyframes and curves; its timeline has the frames per second and the frame at 0 s.
+    output : str
+        File name with a place for the frame's number (`jobs.frame_list.FramePattern`).
+    shutter_deg : float
+        Angle of the shutter: 180 is open for half the time of a frame; 0 draws the moment of the frame.
+    subframes : int or None
+        Number of moments whose mean is drawn; None: from the motion (`motion_blur.subframe_count`).
+    parts : {"multi", "single"}
+        One part of the file for each layer, or one part with the channels of all.
+    cropped : bool
+        Single ghosts have their own data windows instead of the picture's.
+    """
+
+    project: Project
+    output: str
+    shutter_deg: float = 0.0
+    subframes: int | None = None
+    parts: Literal["multi", "single"] = "multi"
+    cropped: bool = False
+
+    def path(self, frame: int) -> Path:
+        """Return the file of a frame."""
+        return FramePattern(self.output).path(frame)
+
+    @property
+    def open_s(self) -> float:
+        """Time that the shutter is open, seconds."""
+        return self.shutter_deg / 360.0 / float(frame_rate(self.project.timeline.fps))
+
+    @property
+    def scale(self) -> float:
+        """Factor of the irradiances in all files: that of the brightest light at any time, so that it is constant."""
+        return 1.0 if self.project.output.pixel_type == "float" else half_scale(peak_intensity(self.project))
+
+
+@dataclass(frozen=True)
+class FrameResult:
+    """What became of a frame.
+
+    Attributes
+    ----------
+    frame : int
+    file : str
+    drawn : bool
+        False: the file was there already, made by the same settings and version.
+    subframes : int
+    remarks : tuple of str
+    """
+
+    frame: int
+    file: str
+    drawn: bool
+    subframes: int
+    remarks: tuple[str, ...] = ()
+
+
+def frame_project(plan: ShotPlan, at_s: float) -> Project:
+    """Return what is drawn at a time: the project without keyframes, with the values that they have then."""
+    return still(project_at(plan.project, at_s))
+
+
+def draw_frame(plan: ShotPlan, frame: int, threads: int | None = None) -> FrameResult:
+    """Draw and write one frame, unless its file is there already.
+
+    Parameters
+    ----------
+    plan : ShotPlan
+    frame : int
+        Its number.
+    threads : int, optional
+        None: all cores. The bytes do not depend on it.
+
+    Returns
+    -------
+    FrameResult
+
+    Raises
+    ------
+    FlarewrightError
+        The project cannot be drawn at this frame, or the file cannot be written; the sentence names the frame.
+    """
+    path = plan.path(frame)
+    try:
+        moments = _moments(plan, frame)
+        digest = _digest(plan, frame, moments)
+        damaged = False
+        if path.exists():
+            made_by = _made_by(path)
+            if made_by == digest:
+                return FrameResult(frame, str(path), False, len(moments))
+            damaged = made_by is None
+        rendering = _draw(moments, threads)
+        _write(plan, frame, moments, rendering, digest)
+    except OutputError:
+        # names the file
+        raise
+    except FlarewrightError as error:
+        raise type(error)(f"frame {frame}: {error}", error.problems) from None
+    again = (f"{path} was damaged or of another program; it was replaced",) if damaged else ()
+    return FrameResult(frame, str(path), True, len(moments), (*again, *rendering.remarks))
+
+
+def part_name(layer: str) -> str:
+    """Return a layer's name in letters, digits and underscores, with two digits a row.
+
+    Examples
+    --------
+    >>> part_name("ghost.7-3"), part_name("ghosts.order4+"), part_name("ghost.sensor-12")
+    ('ghost_07_03', 'ghosts_order4_plus', 'ghost_sensor_12')
+    """
+    if layer.startswith("ghost."):
+        layer = re.sub(r"\d+", lambda number: f"{int(number[0]):02d}", layer)
+    return re.sub(r"\W", "_", layer.replace("+", "_plus"))
+
+
+def _moments(plan: ShotPlan, frame: int) -> tuple[Project, ...]:
+    """Return the project at each sub-frame."""
+    at_s = time_of(frame, plan.project.timeline)
+    if plan.shutter_deg == 0.0 or plan.subframes == 1:
+        return (frame_project(plan, at_s),)
+    number = plan.subframes
+    if number is None:
+        samples = [at_s + plan.open_s * (k / (_SAMPLES - 1) - 0.5) for k in range(_SAMPLES)]
+        projects = [frame_project(plan, sample) for sample in samples]
+        # brightness and colour change without motion; the samples are enough for them
+        still_bright = all(project == projects[0] for project in projects)
+        number = 1 if still_bright else max(_SAMPLES, subframe_count(projects))
+    moments = [frame_project(plan, moment) for moment in subframe_times(at_s, plan.open_s, number)]
+    if moments[0].quality.mode == "reference":
+        # independent errors, which the mean reduces
+        moments = [
+            project.replace(quality=project.quality.replace(seed=project.quality.seed + k))
+            for k, project in enumerate(moments)
+        ]
+    return tuple(moments)
+
+
+def _digest(plan: ShotPlan, frame: int, moments: tuple[Project, ...]) -> str:
+    """Return a digest of all that determines a file: version, projects, contents of their files, kind of file."""
+    timeline = plan.project.timeline
+    lens = moments[0].lens
+    content = digest_of(str(lens)) if is_measured(moments[0]) else open_lens(lens).lens.model_dump_json()
+    made_of = {
+        "version": __version__,
+        "moments": [project.model_dump(mode="json", exclude={"lens"}) for project in moments],
+        "lens": content,
+        "files": {name: digest_of(name) for project in moments for name in _files(project)},
+        "frame": [frame, str(frame_rate(timeline.fps)), plan.open_s],
+        "file": [plan.scale, plan.parts, plan.cropped],
+    }
+    return sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()
+
+
+def _files(project: Project) -> Iterator[str]:
+    """Yield the names of the images that a project reads."""
+    holdouts = [project.holdout, *(light.holdout for light in project.lights)]
+    images = [project.iris.mask if project.iris else None, project.dirt.image]
+    images += [image for hiding in holdouts if hiding for image in (hiding.image, hiding.depth)]
+    yield from (image for image in images if image is not None)
+
+
+def _made_by(path: Path) -> str | None:
+    """Return the digest in a file, checked with all its pixels; None for a damaged or foreign file."""
+    try:
+        return read_exr(path).metadata.get("digest")
+    except (FlarewrightError, KeyError):
+        return None
+
+
+def _draw(moments: tuple[Project, ...], threads: int | None) -> Rendering:
+    """Return the picture of a moment, or the mean of several."""
+    first = _render(moments[0], threads)
+    if len(moments) == 1:
+        return first
+    brightest = moments[0].output.brightest if moments[0].output.layers == "ghosts" else None
+
+    def layers() -> Iterator[tuple[Layer, ...]]:
+        for k, project in enumerate(moments):
+            # which ghosts are the brightest differs between moments: all are averaged, then chosen
+            whole = project.replace(output=project.output.replace(brightest=None))
+            yield first.layers if k == 0 and brightest is None else _render(whole, threads).layers
+
+    mean = list(mean_layers(layers(), moments[0].camera.size_px, len(moments)))
+    if brightest is not None:
+        singles = [layer for layer in mean if layer.name.startswith("ghost.")]
+        singles.sort(key=lambda layer: -float(layer.pixels.sum(dtype="f8")))
+        dropped = {layer.name for layer in singles[brightest:]}
+        mean = [layer for layer in mean if layer.name not in dropped]
+    return replace(first, layers=tuple(mean))  # type: ignore[arg-type]
+
+
+def _render(project: Project, threads: int | None) -> Rendering:
+    if is_measured(project):
+        return render_measured(project)
+    return render_project(project, threads=threads)
+
+
+def _write(plan: ShotPlan, frame: int, moments: tuple[Project, ...], rendering: Rendering, digest: str) -> None:
+    """Write a frame, atomically; see `jobs.worker.WRITING`."""
+    # the moment in the middle stands for the frame
+    shown = moments[len(moments) // 2]
+    project = rendering.project
+    lights = [{"field_deg": light.field_deg, "intensity": light.intensity} for light in shown.lights]
+    metadata = {
+        "version": __version__,
+        "project": project_text(shown),
+        "digest": digest,
+        "frame": str(frame),
+        "subframes": str(len(moments)),
+        "lights": json.dumps(lights),
+    }
+    facts = _facts(shown)
+    names = [part_name(layer.name) for layer in rendering.layers]
+    if len(set(names)) < len(names):
+        raise ProjectError(f"two layers would have one name among {', '.join(names)[:200]}")
+    with WRITING:
+        write_exr(
+            plan.path(frame),
+            [replace(layer, name=name) for layer, name in zip(rendering.layers, names, strict=True)],
+            project.camera.size_px,
+            pixel_type=project.output.pixel_type,
+            scale=plan.scale,
+            metadata=metadata,
+            pixel_aspect=project.camera.pixel_aspect,
+            colorspace=project.output.colorspace,
+            full_windows=not plan.cropped,
+            one_part=plan.parts == "single",
+            attributes=shot_attributes(
+                frame=frame, fps=frame_rate(plan.project.timeline.fps), shutter_s=plan.open_s, **facts
+            ),
+        )
+
+
+def _facts(project: Project) -> dict[str, Any]:
+    """Return what the camera's attributes state; nothing of a measured flare, whose lens is unknown."""
+    if is_measured(project):
+        return {"f_number": project.f_number}
+    settled = resolve_project(project)
+    return {
+        "focal_length": settled.order.efl,
+        "f_number": settled.order.f_number,
+        "focus_distance": project.camera.focus_distance,
+        "lens": settled.lens.name,
+    }
