@@ -133,6 +133,6 @@ def test_a_render_reports_keyframes():
         lens="heliar-tronnier", lights=(Light(field_deg=(3.0, 5.0)), Light(field_deg=(1.0, 5.0), keyframes=keys))
     )
     options = RenderOptions(lens=None, light=[], output=Path("o.exr"))
-    assert "the keyframes of light 1 are left out" in " | ".join(_without_effect(options, shot))
+    assert "keys of light 1 are left out" in " | ".join(_without_effect(options, shot))
     still = shot.replace(lights=shot.lights[:1])
     assert not any("keyframes" in remark for remark in _without_effect(options, still))
