@@ -15,6 +15,7 @@
 - `shape_fields`: aspheres, tilts, figure errors, elements and positions of a lens file
 - `toml_lens`: `read_lens`, `read_lens_toml`, `lens_from_table`
 - `zemax`: `read_zmx`, the `.zmx` format and its glass names
+- `zemax_configurations`: `configurations`, the settings that a `.zmx` file holds
 - `zemax_keywords`: keywords that `zemax` uses, and those without effect
 - `zemax_text`: lines of a `.zmx` file grouped by surface, encodings, decimal commas
 """
