@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -76,6 +78,7 @@ class GhostsOptions:
         None
     )
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print a table of comma-separated values.")] = False
 
 
 @with_options(GhostsOptions)
@@ -112,6 +115,9 @@ def ghosts(options: GhostsOptions) -> None:
 
         veil = veiling_glare(project, options.wavelength_nm)
     print_remarks(dict.fromkeys((*opened.remarks, *settled.remarks, *found)))
+    if options.as_csv:
+        print(ghost_csv(table, options.brightest), end="")
+        return
     if options.as_json:
         print_json(ghost_data(table, options.brightest) | ({} if veil is None else {"veiling_glare": asdict(veil)}))
         return
@@ -151,6 +157,10 @@ def _project_of(options: GhostsOptions) -> Callable[[Lens], Project]:
         "quality": {"paths": options.paths, "orders": options.orders, "order4_limit": options.order4_limit},
         "zoom": options.zoom,
     }
+    if options.as_csv and (options.as_json or options.glare):
+        raise ProjectError(
+            f"--csv prints a table of ghosts, which cannot hold {'--json' if options.as_json else '--glare'}; keep one"
+        )
     if settings["scatter"] is not None and not options.glare:
         raise ProjectError("--scatter, --surface-roughness and --cleanliness change the glare only; add --glare")
     return lambda lens: project_of({"lens": lens, **settings})
@@ -186,6 +196,39 @@ def ghost_data(table: GhostTable, brightest: int | None = None) -> dict[str, Any
             for row in table.ghosts[:brightest]
         ],
     }
+
+
+def ghost_csv(table: GhostTable, brightest: int | None = None) -> str:
+    """Return the analysis as comma-separated values: a header, the direct image, then the ghosts as in `ghost_data`.
+
+    Parameters
+    ----------
+    table : GhostTable
+    brightest : int, optional
+        Largest number of ghosts; None: all.
+
+    Returns
+    -------
+    str
+        Numbers have all their digits, unknown ones are empty; lines end with a line feed.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    columns = (
+        "path", "throughput_mm2", "of_direct", "centroid_x_mm", "centroid_y_mm", "rms_radius_mm", "peak_irradiance",
+        "peak_patch_mm", "bounded_by", "focus_distance_mm",
+    )  # fmt: skip
+    writer.writerow(columns)
+    direct = table.direct.throughput_mm2
+    for row in (table.direct, *table.ghosts[:brightest]):
+        part = row.throughput_mm2 / direct if direct > 0.0 else math.nan
+        values = (
+            row.throughput_mm2, part, *row.centroid_mm, row.rms_radius_mm, row.peak_irradiance, row.peak_patch_mm,
+            row.bounded_by, row.focus_distance_mm,
+        )  # fmt: skip
+        cells = ("" if isinstance(value, float) and not math.isfinite(value) else value for value in values)
+        writer.writerow((row.name, *cells))
+    return text.getvalue()
 
 
 def _print_table(table: GhostTable, name: str, angles: tuple[float, float], brightest: int | None) -> None:
