@@ -6,8 +6,18 @@ import re
 from pathlib import Path
 from typing import Any, Literal
 
+from flarewright.errors import FileError
+
+from .door import outside
+
+FOREIGN_LENS_SUFFIXES = (".lens", ".zmx", ".seq", ".dat", ".csv")
+"""Lens files of other programs; `.json` is a lens or a measured flare."""
+LENS_SUFFIXES = (".toml", *FOREIGN_LENS_SUFFIXES, ".json")
+
 Kind = Literal["lens", "look", "project", "scene"]
 
+# the key that tells them apart stands within so many bytes
+_START = 65536
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
 
@@ -41,7 +51,7 @@ def refuse_other_kind(path: str | Path, table: dict[str, Any], wanted: Kind) -> 
 
 def refuse_lens_suffix(path: str | Path, wanted: Kind) -> None:
     """Raise ValueError when the suffix is that of another program's lens file, which is not TOML."""
-    if Path(path).is_file() and Path(path).suffix.lower() in (".lens", ".zmx"):
+    if Path(path).is_file() and Path(path).suffix.lower() in FOREIGN_LENS_SUFFIXES:
         raise ValueError(f"{path} is a lens file, not a {wanted} file: check it with flarewright lens check {path}")
 
 
@@ -56,6 +66,16 @@ def kind_of(table: dict[str, Any]) -> Kind | None:
     if "cameras" in table:
         kinds.append("scene")
     return kinds[0] if len(kinds) == 1 else None
+
+
+def is_lens_json(path: str | Path) -> bool:
+    """Return whether a JSON file is a lens of another program, not a measured flare; False if it cannot be read."""
+    try:
+        with outside(path, "a JSON file") as file:
+            start = file.read(_START)
+    except FileError:
+        return False
+    return start.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{") and b'"lens_elements"' in start
 
 
 def foreign_hint(text: str) -> str:
@@ -74,13 +94,13 @@ def foreign_hint(text: str) -> str:
     start = text[:20000]
     if start.lstrip().startswith("{") and '"lens_elements"' in start:
         return (
-            "is a lens of RealFlare (JSON), which Flarewright does not read: write its lens_elements as rows of a lens "
-            "file (docs/lens-file.md)"
+            "is a lens of RealFlare (JSON): name it with the suffix .json and give it as a lens, as in "
+            "flarewright lens check FILE"
         )
     lines = [line.split() for line in start.splitlines() if line.strip() and not line.lstrip().startswith("#")]
     if len(lines) >= 3 and all(len(words) == 4 and all(map(_NUMBER.fullmatch, words)) for words in lines[:12]):
         return (
-            "is a lens table of pbrt (radius, thickness, index, aperture diameter), which Flarewright does not read: "
-            "write its lines as rows of a lens file (docs/lens-file.md)"
+            "is a lens table of pbrt (radius, thickness, index, aperture diameter): name it with the suffix .dat and "
+            "give it as a lens, as in flarewright lens check FILE"
         )
     return ""

@@ -29,7 +29,7 @@ from ..files.sentences import did_you_mean, shorten, summary, validation_sentenc
 from ..files.text_file import read_bytes
 from . import media
 from .glass_catalogue import CatalogueGlass, by_name, same_name
-from .lens_fields import ROW_NUMBERS
+from .lens_fields import CURVATURE, ROW_NUMBERS
 from .zemax_configurations import configurations
 from .zemax_keywords import APERTURES, HARMLESS, HARMLESS_OF_SURFACE, USED, USED_OF_SURFACE, VIGNETTING
 from .zemax_text import Block, Text, decoded, grouped, number_of
@@ -152,6 +152,8 @@ def _row(
         return None
     thickness = _gap(block, found) * mm
     values = _shape(block, mm, found) | {"thickness": thickness, "semi_diameter": _rim(block, mm, found)}
+    if refusal := CURVATURE.refuse(values.get("curvature", 0.0)):
+        problems.append(f"{where}: the curvature {refusal}")
     if glass:
         values["medium"] = _medium(block.number, glass, found, findings)
         if thickness < 0.0:

@@ -152,6 +152,8 @@ class RawSequence(Frozen):
         The largest field, as an angle or as an image height in mm.
     focus_distance : float or None
         From the object to the first of `rows`, mm; None: object at infinity.
+    stated_focal_length : float or None
+        As the file states it, mm.
     configurations : tuple of Configuration
         Settings of a zoom or of the focus; empty for a file with one.
     remarks : tuple of str
@@ -167,5 +169,6 @@ class RawSequence(Frozen):
     field_deg: float | None = None
     image_height: float | None = None
     focus_distance: float | None = None
+    stated_focal_length: float | None = None
     configurations: tuple[Configuration, ...] = ()
     remarks: tuple[str, ...] = ()

@@ -55,7 +55,10 @@ def lens_of_sequence(raw: RawSequence) -> LensReading:
     distance = None if raw.focus_distance is None else raw.focus_distance + front
     if distance is not None:
         remarks.append(f"the object lies {distance:g} mm in front of the lens; it is focused there")
-    lens = draft.replace(rows=tuple(rows), f_number=f_number, field_deg=_field_deg(raw, order), focus_distance=distance)
+    lens = draft.replace(
+        rows=tuple(rows), f_number=f_number, field_deg=_field_deg(raw, order), focus_distance=distance,
+        stated_focal_length=raw.stated_focal_length,
+    )  # fmt: skip
     positions, found = positions_of(lens, tuple(_settings(raw, remarks)))
     lens = lens.replace(positions=positions)
     remarks += found
