@@ -13,6 +13,8 @@ from .door import outside
 FOREIGN_LENS_SUFFIXES = (".lens", ".zmx", ".seq", ".dat", ".csv")
 """Lens files of other programs; `.json` is a lens or a measured flare."""
 LENS_SUFFIXES = (".toml", *FOREIGN_LENS_SUFFIXES, ".json")
+WRITTEN_LENS_SUFFIXES = (".toml", ".zmx", ".lens", ".csv")
+"""Lens files that `workflow.lens_export` writes."""
 
 Kind = Literal["lens", "look", "project", "scene"]
 

@@ -17,10 +17,12 @@
 - `scatter_text`: the `[scatter]` table of a lens file
 - `shape_fields`: aspheres, tilts, figure errors, elements and positions of a lens file
 - `table_rows`: `sequence_of`, rows of simple tables
+- `table_writer`: `csv_text`, `dotlens_text`
 - `tables`: `read_csv_table`, `read_dat`, CSV and the lens tables of pbrt
 - `toml_lens`: `read_lens`, `read_lens_toml`, `lens_from_table`
 - `zemax`: `read_zmx`, the `.zmx` format and its glass names
 - `zemax_configurations`: `configurations`, the settings that a `.zmx` file holds
 - `zemax_keywords`: keywords that `zemax` uses, and those without effect
+- `zemax_writer`: `zmx_text`, the `.zmx` format with positions as configurations
 - `zemax_text`: lines of a `.zmx` file grouped by surface, encodings, decimal commas
 """
