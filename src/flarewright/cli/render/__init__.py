@@ -8,4 +8,5 @@
 - `profile_table`: `--profile`, the table of what each ghost costs
 - `preview`: the PNG: options, exposure, file
 - `ghosts_command`: `ghosts`, the ghost analysis of a lens
+- `ghost_sweep`: its `--sweep` over fields, wavelengths and f-numbers
 """
