@@ -28,7 +28,7 @@ def shape(lens):
     return rows, [row.semi_diameter for row in surfaces], [row.thickness for row in lens.rows[:-1]], lens.stop_row
 
 
-@pytest.mark.parametrize("suffix", [".zmx", ".csv", ".lens"])
+@pytest.mark.parametrize("suffix", [".zmx", ".csv", ".lens", ".json"])
 def test_every_shipped_lens_that_a_format_holds_reads_back(tmp_path, suffix):
     written, refused = 0, []
     for name in library_names():
@@ -49,10 +49,10 @@ def test_every_shipped_lens_that_a_format_holds_reads_back(tmp_path, suffix):
         assert found.rows[-1].thickness == pytest.approx(order.sensor_distance, rel=1e-12)
         written += 1
     assert all("different curvatures in its meridians" in why or "is no sphere" in why for why in refused)
-    assert written >= {".zmx": 19, ".csv": 18, ".lens": 12}[suffix]
+    assert written >= {".zmx": 19, ".csv": 18, ".lens": 12, ".json": 19}[suffix]
 
 
-@pytest.mark.parametrize("suffix", [".zmx", ".csv", ".lens"])
+@pytest.mark.parametrize("suffix", [".zmx", ".csv", ".lens", ".json"])
 def test_the_ghosts_are_the_same(tmp_path, suffix):
     path = tmp_path / f"tessar{suffix}"
     lens = open_lens("tessar-brendel").lens

@@ -7,6 +7,7 @@ from pathlib import Path
 from ..errors import LensError
 from ..io.files.atomic_write import write_atomically
 from ..io.lens.lens_writer import write_lens
+from ..io.lens.optiland import optiland_text
 from ..io.lens.table_writer import csv_text, dotlens_text
 from ..io.lens.zemax_writer import LensState, zmx_text
 from ..model import Iris, Lens, Surface
@@ -56,6 +57,8 @@ def _text(lens: Lens, suffix: str) -> tuple[str, tuple[str, ...]]:
     state = _state(lens)
     if suffix == ".csv":
         return csv_text(lens, state.sensor_distance, state.stop_semi_diameter), ()
+    if suffix == ".json":
+        return optiland_text(lens, state.sensor_distance, state.stop_semi_diameter), ()
     efl = first_order(lens).efl
     return dotlens_text(lens, efl, state.sensor_distance, state.stop_semi_diameter), ()
 
@@ -72,12 +75,12 @@ def _left_out(lens: Lens, suffix: str) -> list[str]:
     if suffix == ".lens":
         if any(row.coating is not None for _, row in surfaces):
             remarks.append(".lens files count the layers of a coating; its films are left out")
-        if any(row.medium is not None and row.medium.glass is not None for _, row in surfaces):
-            remarks.append(".lens files have no names of glasses; n_d and V_d are written")
         if lens.field_deg is not None or lens.focus_distance is not None:
             remarks.append(".lens files have neither field nor focus distance; left out")
     elif any(row.coating is not None for _, row in surfaces):
         remarks.append(f"{suffix} files describe no coatings here; left out")
+    if suffix in (".lens", ".json") and any(row.medium and row.medium.glass for _, row in surfaces):
+        remarks.append("the names of glasses are left out; n_d and V_d are written")
     if lens.coating_presets:
         remarks.append("the coating presets are left out")
     if suffix == ".csv" and lens.focus_distance is not None:

@@ -26,7 +26,7 @@ EPILOG = (
 
 def convert(
     source: Annotated[str, typer.Argument(metavar="IN", help="A lens file of any known kind, or a shipped name.")],
-    target: Annotated[Path, typer.Argument(metavar="OUT", help="The file to write: *.toml, *.zmx, *.lens, *.csv.")],
+    target: Annotated[Path, typer.Argument(metavar="OUT", help="The file to write: *.toml, .zmx, .csv, .lens, .json.")],
     apertures: Annotated[str | None, typer.Option(metavar="KIND", help=APERTURES_HELP)] = None,
     first_column: Annotated[str | None, typer.Option(metavar="KIND", help=FIRST_COLUMN_HELP)] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,

@@ -13,11 +13,12 @@ from .door import outside
 FOREIGN_LENS_SUFFIXES = (".lens", ".zmx", ".seq", ".dat", ".csv")
 """Lens files of other programs; `.json` is a lens or a measured flare."""
 LENS_SUFFIXES = (".toml", *FOREIGN_LENS_SUFFIXES, ".json")
-WRITTEN_LENS_SUFFIXES = (".toml", ".zmx", ".lens", ".csv")
+WRITTEN_LENS_SUFFIXES = (".toml", ".zmx", ".lens", ".csv", ".json")
 """Lens files that `workflow.lens_export` writes."""
 
 Kind = Literal["lens", "look", "project", "scene"]
 
+REALFLARE_KEY, OPTILAND_KEY = "lens_elements", "surface_group"
 # the key that tells them apart stands within so many bytes
 _START = 65536
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
@@ -70,14 +71,16 @@ def kind_of(table: dict[str, Any]) -> Kind | None:
     return kinds[0] if len(kinds) == 1 else None
 
 
-def is_lens_json(path: str | Path) -> bool:
-    """Return whether a JSON file is a lens of another program, not a measured flare; False if it cannot be read."""
+def lens_key(path: str | Path) -> str:
+    """Return the key that makes a JSON file a lens of another program; "" for other files, such as a measured flare."""
     try:
         with outside(path, "a JSON file") as file:
             start = file.read(_START)
     except FileError:
-        return False
-    return start.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{") and b'"lens_elements"' in start
+        return ""
+    if not start.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
+        return ""
+    return next((key for key in (REALFLARE_KEY, OPTILAND_KEY) if f'"{key}"'.encode() in start), "")
 
 
 def foreign_hint(text: str) -> str:

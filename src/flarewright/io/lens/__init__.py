@@ -12,6 +12,7 @@
 - `library`: `library_names`, `lens_path`, the lenses that ship with the program
 - `media`: `attach`, `complete_medium`, dispersions for the media of a prescription
 - `medium_names`: `named_medium`, `numbered_medium`, media as other programs write them
+- `optiland`: `read_optiland`, `optiland_text`, the lenses of Optiland
 - `plate_text`: `parse_plate`, `parse_imperfection`, `parse_grating`
 - `realflare`: `read_realflare`, the lenses of RealFlare
 - `scatter_text`: the `[scatter]` table of a lens file

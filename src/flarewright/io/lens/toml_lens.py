@@ -27,10 +27,10 @@ from flarewright.model.lens.prescription import NO_GLASS
 from flarewright.model.lens.raw_lens import LensReading, RawLens, RawSequence
 
 from ..files.door import shown
-from ..files.file_kind import foreign_hint, is_lens_json, refuse_other_kind
+from ..files.file_kind import OPTILAND_KEY, foreign_hint, lens_key, refuse_other_kind
 from ..files.sentences import count, did_you_mean, shorten, summary, validation_sentences
 from ..files.text_file import read_bytes, read_toml
-from . import codev, dotlens, media, realflare, tables, zemax
+from . import codev, dotlens, media, optiland, realflare, tables, zemax
 from .coating_text import coating_from
 from .lens_fields import (
     CURVATURE,
@@ -63,7 +63,8 @@ def read_lens(
     ----------
     path : str or Path
         `.toml` is our own format; `.lens` is a text table that several flare tools share; `.zmx` is a sequential file
-        of Zemax, `.seq` one of CODE V; `.dat` is a lens of pbrt, `.csv` a table, `.json` a lens of RealFlare.
+        of Zemax, `.seq` one of CODE V; `.dat` is a lens of pbrt, `.csv` a table, `.json` a lens of RealFlare or
+        of Optiland.
     first_column : {"radii", "curvatures"}, optional
         Of a `.seq` file that does not state it.
 
@@ -89,8 +90,8 @@ def read_lens(
         return tables.read_dat(path)
     if suffix == ".csv":
         return tables.read_csv_table(path)
-    if suffix == ".json" and is_lens_json(path):
-        return realflare.read_realflare(path)
+    if suffix == ".json" and (key := lens_key(path)):
+        return optiland.read_optiland(path) if key == OPTILAND_KEY else realflare.read_realflare(path)
     if suffix == ".toml" or Path(path).is_dir() or not Path(path).exists():
         return read_lens_toml(path)
     with suppress(FileError):
@@ -103,7 +104,7 @@ def read_lens(
         )
     raise LensError(
         f"{path} is of an unknown kind: Flarewright reads .toml (its own), .lens, .zmx, .seq, .dat, .csv and "
-        "RealFlare's .json files"
+        "the .json files of RealFlare and Optiland"
     )
 
 
