@@ -53,7 +53,7 @@ def test_the_focal_length_follows_from_the_numbers_of_the_file(path):
         return
     lens, text = load_lens(path), text_of(path)
     assert first_order(lens).efl == pytest.approx(focal_length(text), rel=1e-6)
-    # every configuration is a position, and has the focal length of its own gaps
+    # every configuration is a position, and has the focal length that its gaps give
     cells = [line.split() for line in text.splitlines() if line.startswith("THIC ")]
     wanted = [
         focal_length(text, {int(cell[1]): float(cell[3]) for cell in cells if cell[2] == str(number)})

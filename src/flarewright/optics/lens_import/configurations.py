@@ -94,7 +94,7 @@ def positions_of(lens: Lens, settings: Sequence[Setting]) -> tuple[tuple[Positio
 
 
 def _moved(lens: Lens, setting: Setting) -> list[int]:
-    """Return the rows before a gap that differs from the lens' own; that in front of the sensor is none of them."""
+    """Return the rows before a gap that differs from the lens' own; except that in front of the sensor."""
     pairs = zip(lens.rows[:-1], setting.rows[:-1], strict=True)
     return [k for k, (a, b) in enumerate(pairs) if abs(a.thickness - b.thickness) > SAME_GAP]
 
