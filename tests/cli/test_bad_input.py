@@ -458,7 +458,7 @@ COMMAND_LINES = {
     "convert onto another file": (["lens", "convert", "heliar-tronnier", "lens.toml"], "replace it with --force"),
     "a ghost to draw nowhere": (["lens", "show", "heliar-tronnier", "--ghost", "4-1"], "add --plot OUT.svg"),
     "a light to draw nowhere": (["lens", "show", "heliar-tronnier", "--light", "4,1"], "add --plot OUT.svg"),
-    "convert to another kind": (["lens", "convert", "lens.toml", "a.lens"], "*.toml"),
+    "convert to another kind": (["lens", "convert", "lens.toml", "a.seq"], "*.toml"),
     "init over a file": (["project", "init", "heliar-tronnier", "-o", "lens.toml"], "exists already"),
     "check a project that is a lens": (["project", "check", "lens.toml"], "is a lens file, not a project file"),
 }  # fmt: skip

@@ -1,5 +1,7 @@
 """Every command does what its help says: one JSON object on stdout, text on stderr, complete files or none."""
 
+import csv
+import io
 import json
 import os
 import subprocess
@@ -388,6 +390,23 @@ def test_ghosts_json_is_the_promised_contract(capsys, folder):
     assert wide_open["f_number"] == 5.0
     assert wide_open["entrance_pupil_diameter_mm"] == pytest.approx(wide_open["efl_mm"] / 5.0, rel=1e-9)
     assert len(wide_open["ghosts"]) == 1
+
+
+def test_ghosts_csv_has_the_numbers_of_the_json(capsys):
+    stopped = ("ghosts", "heliar-tronnier", "--light", "10,0", "--fstop", "8", "--coating", "none", "--brightest", "5")
+    data = call_json(capsys, *stopped)
+    assert run([*stopped, "--csv"]) == 0
+    rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    assert [row["path"] for row in rows] == [
+        "direct",
+        *(f"{row['first_reflection']}-{row['second_reflection']}" for row in data["ghosts"]),
+    ]
+    for row, wanted in zip(rows, [data["direct"], *data["ghosts"]], strict=True):
+        assert float(row["throughput_mm2"]) == wanted["throughput_mm2"]
+        assert float(row["of_direct"]) == wanted["throughput_mm2"] / data["direct"]["throughput_mm2"]
+        assert [float(row["centroid_x_mm"]), float(row["centroid_y_mm"])] == wanted["centroid_mm"]
+    assert run([*stopped, "--csv", "--json"]) == 2
+    assert "keep one" in capsys.readouterr().err
 
 
 def test_ghosts_of_a_near_light(capsys):

@@ -25,6 +25,10 @@ READERS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("lens.toml", ("lens", "check", "lens.toml", "--json")),
     ("lens.lens", ("lens", "check", "lens.lens", "--json")),
     ("lens.zmx", ("lens", "check", "lens.zmx", "--json")),
+    ("lens.seq", ("lens", "check", "lens.seq", "--json", "--first-column", "curvatures")),
+    ("lens.csv", ("lens", "check", "lens.csv", "--json")),
+    ("lens.dat", ("lens", "check", "lens.dat", "--json")),
+    ("lens.json", ("lens", "check", "lens.json", "--json")),
     ("shot.toml", BARE),
     ("shot.toml", ("project", "check", "shot.toml")),
     ("shot.toml", ("design", "solve", "shot.toml", "-o", "found", "--time", "0.1")),
@@ -92,6 +96,46 @@ SURF 3
   DIAM 12
 SURF 4
   DISZ 0
+MNUM 2 1
+THIC   0   1 1.0E+10 0 0 0
+THIC   0   2 900 0 0 0
+THIC   1   1 2 0 0 0
+THIC   1   2 3 0 0 0
+SDIA   1   2 8 0 0 0
+"""
+CODEV = """\
+RDM N; LEN
+TITLE 'A plano-convex lens'
+EPD 20
+YAN 0 5
+PRV
+  PWL 700 587.6 486.1
+  'OWN' 1.49 1.5 1.51
+END
+SO 0 1e11
+S 0 2
+  STO
+S 0 4 'OWN'
+  CIR 12
+S -0.02 100
+  ASP
+  K -0.5; A 1e-7
+SI 0 0
+GO
+"""
+TABLE = """\
+# f_number = 5
+radius,thickness,n_d,v_d,semi_diameter,A4
+stop,2,,,10,
+flat,4,1.5,60,12,
+-50,100,,,12,1e-7
+"""
+PBRT = "# A plano-convex lens\n0 2 0 20\n1e9 4 1.5 24\n-50 100 1 24\n"
+REALFLARE = """\
+{"name": "A lens", "focal_length": 100, "fstop": 5, "aperture_index": 0, "lens_elements": [
+{"radius": 0, "distance": 2, "height": 10},
+{"radius": 0, "distance": 4, "refractive_index": 1.5, "abbe_nr": 60, "height": 12},
+{"radius": -50, "distance": 100, "refractive_index": 1, "abbe_nr": 0, "height": 12}]}
 """
 
 WORDS = (
@@ -133,6 +177,8 @@ def _more(folder: Path) -> None:
     """Write the files that only readers need."""
     (folder / "lens.lens").write_text(DOTLENS, "utf-8")
     (folder / "lens.zmx").write_text(ZEMAX, "utf-8")
+    for name, text in (("seq", CODEV), ("csv", TABLE), ("dat", PBRT), ("json", REALFLARE)):
+        (folder / f"lens.{name}").write_text(text, "utf-8")
     (folder / "look.toml").write_text(LOOK, "utf-8")
     (folder / "spectrum.csv").write_text("400,1\n500,2\n600,1.5\n700,1\n", "utf-8")
     y, x = np.mgrid[:24, :24] - 11.5

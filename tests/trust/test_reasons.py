@@ -31,25 +31,23 @@ PBRT = "# a double Gauss\n30 3.8 1.67 25\n85 0.1 1 25\n19.5 4 1.67 23\n0 4.5 0 1
 @pytest.mark.parametrize(
     "command",
     [
-        ["lens", "check", "FILE"],
-        ["lens", "show", "FILE"],
-        ["render", "FILE", "--light", "3,3", "-o", "o.exr"],
         ["render", "--project", "FILE", "-o", "o.exr"],
         ["project", "check", "FILE"],
         ["scene", "check", "FILE"],
-        ["predict", "FILE"],
     ],
     ids=lambda command: " ".join(command[:2]),
 )
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
-        ("other.json", json.dumps(REALFLARE), "is a lens of RealFlare (JSON), which Flarewright does not read"),
-        ("other.dat", PBRT, "is a lens table of pbrt (radius, thickness, index, aperture diameter)"),
+        ("other.json", json.dumps(REALFLARE), "is a lens of RealFlare (JSON): name it with the suffix .json"),
+        ("other.dat", PBRT, "other.dat is a lens"),
     ],
     ids=["realflare", "pbrt"],
 )
-def test_lenses_of_other_programs_get_one_hint_everywhere(tmp_path, monkeypatch, capsys, command, name, text, words):
+def test_lenses_of_other_programs_get_one_hint_where_no_lens_is_read(
+    tmp_path, monkeypatch, capsys, command, name, text, words
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / name).write_text(text)
     assert run([name if word == "FILE" else word for word in command]) == 2

@@ -101,7 +101,7 @@ def test_terms_of_an_extended_asphere_count_in_both_places(read):
     assert "surface 1: PARM has no meaning for the type STANDARD; left out" in remarks
 
 
-@pytest.mark.parametrize(("kind", "more"), [("XOSPHERE", "XDAT 6 -2e-5"), ("TOROIDAL", "PARM 1 0")])
+@pytest.mark.parametrize(("kind", "more"), [("BINARY_2", "XDAT 6 -2e-5"), ("FRESNELS", "PARM 1 0")])
 def test_surfaces_that_are_not_supported_are_one_sentence(read, kind, more):
     message = refusal(read, singlet(front=(f"TYPE {kind}", "CURV 0.02", "DISZ 6", N_BK7, "DIAM 10", more)))
     assert f"surface 1 is of type {kind}; known are" in message

@@ -9,11 +9,12 @@ import pytest
 from flarewright.errors import LensError
 from flarewright.io.lens.glass_catalogue import by_name
 from flarewright.optics.lens.paraxial import first_order
+from flarewright.optics.lens.zoom import at_position
 from flarewright.render.scene.resolve import load_lens
 
 CORPUS = Path(__file__).parents[3] / "shared" / "zmx_corpus"
 FILES = sorted(CORPUS.glob("*.zmx"))
-# another medium than air in front, and odd aspheres, which the reader refuses with this reason
+# another medium than air in front, and aspheres with odd powers, which the reader refuses with this reason
 REFUSED = {
     "Fujifilm_Fujinon_23mm_F2.0_Super_EBC_(X100F).zmx": "XOSPHERE",
     "Fujifilm_Fujinon_GF30mm_F3.5_R_WR.zmx": "XOSPHERE",
@@ -26,17 +27,21 @@ REFUSED = {
 pytestmark = pytest.mark.skipif(not FILES, reason="the corpus is not part of the repository")
 
 
-def focal_length(text):
-    """Trace a ray parallel to the axis through the surfaces of a file and return h / slope, mm."""
+def focal_length(text, gaps=None):
+    """Trace a ray parallel to the axis through the surfaces of a file and return h / slope, mm.
+
+    `gaps` replaces the distances behind some surfaces.
+    """
     blocks = [part.splitlines() for part in text.split("\nSURF ")[1:]]
     h, slope, before = 1.0, 0.0, 1.0
-    for lines in blocks[1:-1]:
+    for number, lines in enumerate(blocks[1:-1], start=1):
         words = {line.split()[0]: line.split()[1:] for line in lines[1:] if line.split()}
         glass, square = words.get("GLAS"), [line.split()[2] for line in lines if line.split()[:2] == ["PARM", "1"]]
         after = 1.0 if glass is None else float(glass[3]) if len(glass) > 4 else by_name(glass[0]).n_d
         curvature = float(words["CURV"][0]) + 2.0 * (float(square[0]) if words.get("TYPE") == ["EVENASPH"] else 0.0)
         slope = (before * slope + (before - after) * curvature * h) / after
-        h, before = h + slope * float(words["DISZ"][0].replace("INFINITY", "0")), after
+        gap = float(words["DISZ"][0].replace("INFINITY", "0"))
+        h, before = h + slope * (gaps or {}).get(number, gap), after
     return -1.0 / slope
 
 
@@ -46,6 +51,18 @@ def test_the_focal_length_follows_from_the_numbers_of_the_file(path):
         with pytest.raises(LensError, match=reason):
             load_lens(path)
         return
+    lens, text = load_lens(path), text_of(path)
+    assert first_order(lens).efl == pytest.approx(focal_length(text), rel=1e-6)
+    # every configuration is a position, and has the focal length that its gaps give
+    cells = [line.split() for line in text.splitlines() if line.startswith("THIC ")]
+    wanted = [
+        focal_length(text, {int(cell[1]): float(cell[3]) for cell in cells if cell[2] == str(number)})
+        for number in range(1, 1 + max((int(cell[2]) for cell in cells), default=0))
+    ]
+    found = [first_order(at_position(lens, position)).efl for position in lens.positions]
+    assert found == pytest.approx(wanted, rel=1e-6)
+
+
+def text_of(path):
     data = path.read_bytes()
-    text = data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
-    assert first_order(load_lens(path)).efl == pytest.approx(focal_length(text.replace("\r", "")), rel=1e-6)
+    return data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig").replace("\r", "")

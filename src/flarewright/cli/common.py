@@ -20,9 +20,11 @@ from ..errors import FlarewrightError, OutputError, ProjectError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ..io.lens.codev import FirstColumn
     from ..optics.lens_import.patent_repair import Apertures
     from ..typing import Progress
 
+FIRST_COLUMN_HELP = "Read the first column of .seq files without RDM as radii or curvatures."
 APERTURES_HELP = "Read the last column of .lens tables as diameters or semi-diameters (default: by the f-number)."
 
 
@@ -91,6 +93,14 @@ def aperture_reading(text: str | None) -> Apertures:
         case "diameters" | "semi-diameters":
             return text
     raise ProjectError(f"--apertures {text!r} is unknown; choose diameters or semi-diameters")
+
+
+def first_column_reading(text: str | None) -> FirstColumn | None:
+    """Return the reading of the first column of a `.seq` file that `--first-column` chooses."""
+    match text:
+        case None | "radii" | "curvatures":
+            return text
+    raise ProjectError(f"--first-column {text!r} is unknown; choose radii or curvatures")
 
 
 def print_json(data: dict[str, Any]) -> None:

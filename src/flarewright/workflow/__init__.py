@@ -7,6 +7,8 @@ The command line and other front ends call these functions; nothing here prints.
 - `lens_search`: `search_lenses` searches lenses for a project's targets and returns a `LensSearch`
 - `flare_curves`: `flare_curves` predicts a lens' flare over the constellation
 - `lens_flares`: `lens_flares`, `scene_flare` and `camera_project` build the flares that a prediction needs
+- `ghost_sweep`: `sweep_ghosts` analyses ghosts over fields, wavelengths and f-numbers, `surface_gains` ranks surfaces
+- `lens_export`: `export_lens` writes a lens in the formats of other programs
 - `measured_flares`: `model_flares` builds them from a measured model
 - `measured_camera`: `model_in_scene` does so for a camera of a scene; `model_errors` finds its errors
 - `project_files`: `open_project_files` opens all files of a project and collects the errors

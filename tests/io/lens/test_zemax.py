@@ -8,11 +8,13 @@ from typer.testing import CliRunner
 
 from flarewright.cli.app import app
 from flarewright.errors import LensError
+from flarewright.io.lens.lens_writer import write_lens
 from flarewright.io.lens.toml_lens import read_lens
 from flarewright.io.lens.zemax import decoded
 from flarewright.model import Stop, Surface
 from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.surface_shape import sag
+from flarewright.optics.lens.zoom import positioned
 from flarewright.render.scene.resolve import load_lens
 
 HEAD = """\
@@ -285,3 +287,134 @@ def test_a_field_given_as_a_height_is_in_the_unit_of_the_file(unit, mm, tmp_path
     lens = load_lens(write(tmp_path, text))
     assert first_order(lens).efl == pytest.approx(mm * order.efl, rel=1e-6)
     assert lens.field_deg == pytest.approx(np.degrees(np.arctan(0.5)), rel=1e-3)
+
+
+def cells(key, place, *values):
+    return "".join(f"{key}   {place}   {k} {value} 0 0 0 1 1 1 0 0\n" for k, value in enumerate(values, 1))
+
+
+def zoom(tail, **more):
+    """Return two thin doublets with a gap between them that a table of configurations changes."""
+    return text_of(
+        surface(1, 1 / 80.0, 4.0, "N-BK7 0 0 1.5 40", "10 1"), surface(2, -1 / 80.0, 20.0, rim="10 1"),
+        surface(3, 0.0, 1.0, rim="6 0", more=["STOP"]),
+        surface(4, 1 / 60.0, 4.0, "N-BK7 0 0 1.5 40", "10 1"), surface(5, -1 / 60.0, 30.0, rim="10 1"), surface(6),
+        tail=tail, **more,
+    )  # fmt: skip
+
+
+def test_configurations_become_positions_with_the_focal_length_of_two_thin_lenses(tmp_path):
+    tail = "MNUM 3 1\n" + cells("THIC", 2, 20.0, 30.0, 10.0) + cells("THIC", 5, 30, 25, 35) + cells("MOFF", 0, 1, 2, 3)
+    lens, remarks = loaded(write(tmp_path, zoom(tail)))
+    assert [position.gaps for position in lens.positions] == [((1, 20.0),), ((1, 30.0),), ((1, 10.0),)]
+    index = 1.51680
+    one, other = ((index - 1) * 2 / radius for radius in (80.0, 60.0))
+    for position in lens.positions:
+        # thin lenses a distance d apart, from principal plane to principal plane: 1/f = p + q - d p q
+        apart = position.gaps[0][1] + 1.0 + 2 * 4.0 / (2 * index)
+        thin = 1.0 / (one + other - apart * one * other)
+        found = first_order(positioned(lens, position.name, None))
+        assert found.efl == pytest.approx(thin, rel=0.01)
+        assert position.name == f"{found.efl:.4g} mm"
+    assert any("are positions" in remark for remark in remarks)
+    assert not any("configuration " in remark for remark in remarks)
+    # what is written reads back as the same lens
+    write_lens(lens, tmp_path / "own.toml")
+    assert loaded(tmp_path / "own.toml")[0].positions == lens.positions
+
+
+def test_aperture_and_field_of_a_configuration(tmp_path):
+    table = cells("THIC", 2, 20.0, 30.0) + cells("YFIE", 2, 10.0, 7.0)
+    fixed, _ = loaded(write(tmp_path, zoom("MNUM 2 1\n" + table + cells("APER", 0, 4.0, 5.6))))
+    assert [(each.f_number, each.field_deg) for each in fixed.positions] == [(None, None), (5.6, 7.0)]
+    # the entrance pupil and the stop's size keep their values, so that the f-number changes with the focal length
+    pupil, _ = loaded(write(tmp_path, zoom("MNUM 2 1\n" + table, opening="ENPD 10")))
+    orders = [first_order(positioned(pupil, position.name, None)) for position in pupil.positions]
+    assert [order.entrance_pupil_diameter for order in orders] == pytest.approx([10.0, 10.0], rel=1e-9)
+    sized, _ = loaded(write(tmp_path, zoom("MNUM 2 1\n" + table + cells("SDIA", 3, 6, 5), opening="FLOA 0")))
+    orders = [first_order(positioned(sized, position.name, None)) for position in sized.positions]
+    assert [order.stop_semi_diameter for order in orders] == pytest.approx([6.0, 5.0], rel=1e-9)
+
+
+def test_near_configurations_are_focus_positions(tmp_path):
+    prime = cells("THIC", 0, "INFINITY", 500.0) + cells("THIC", 2, 20.0, 22.0)
+    lens, _ = loaded(write(tmp_path, zoom("MNUM 2 1\n" + prime)))
+    assert [(each.name, each.focus_distance) for each in lens.positions] == [("infinity", None), ("at 500 mm", 500.0)]
+    # --focus interpolates the gap in 1 / distance
+    assert positioned(lens, None, 1000.0).rows[1].thickness == pytest.approx(21.0)
+    both = cells("THIC", 0, 1e10, 400.0, 1e10, 2000.0) + cells("THIC", 2, 20.0, 21.0, 30.0, 31.0)
+    lens, _ = loaded(write(tmp_path, zoom("MNUM 4 1\n" + both)))
+    names = [position.name for position in lens.positions]
+    assert [name.partition(" at ")[2] for name in names] == ["", "400 mm", "", "2 m"]
+    lengths = [position.focal_length for position in lens.positions]
+    assert lengths[0] == lengths[1] != lengths[2] == lengths[3]
+    by_rank = cells("THIC", 0, 1e10, 1e10, 900.0, 400.0) + cells("THIC", 2, 20.0, 30.0, 31.0, 21.0)
+    lens, _ = loaded(write(tmp_path, zoom("MNUM 4 1\n" + by_rank)))
+    lengths = [position.focal_length for position in lens.positions]
+    assert lengths[0] == lengths[3] != lengths[1] == lengths[2]
+
+
+@pytest.mark.parametrize(
+    ("table", "kept", "said"),
+    [
+        (cells("THIC", 2, 20, 30, 40) + cells("CRVT", 4, 0.0166, 0.02, 0.0166), 2, "configuration 2 differs in CRVT 4"),
+        (cells("THIC", 2, 20, 30, 40) + cells("GLSS", 1, "N-BK7", "SF6", "N-BK7"), 2, "differs in GLSS 1"),
+        (cells("THIC", 2, 20, 30, 40) + cells("THIC", 4, 4, 5, 4), 2, "the glass behind row 3 has another thickness"),
+        (cells("THIC", 2, 20, 30, -3), 2, "configuration 3 is left out: the moving gap behind row 1 is negative"),
+        (cells("THIC", 2, 20, 30, "x"), 2, "configuration 3: THIC 2 is 'x', no number"),
+        (cells("THIC", 2, 20, 30, 30), 2, "configuration 3 repeats the gaps of configuration 2"),
+        (cells("THIC", 2, 20, 30, 40) + cells("SDIA", 4, 10, 9, 8), 3, "surface 4: the rim differs"),
+        (cells("THIC", 5, 20, 30, 40), 0, "repeats the gaps of configuration 1"),
+        (cells("THIC", 0, 1e10, 900, 500) + cells("THIC", 5, 30, 31, 33), 0, "as --focus does: no positions"),
+        (cells("THIC", 0, 1e10, 1e10, 500) + cells("THIC", 2, 20, 30, 31), 2, "to which focal length each near"),
+        (cells("THIC", 2, 20, 30, 20000), 2, "configuration 3 is left out: input should be less"),
+    ],
+)  # fmt: skip
+def test_what_a_position_cannot_hold_is_reported(tmp_path, table, kept, said):
+    lens, remarks = loaded(write(tmp_path, zoom("MNUM 3 1\n" + table)))
+    assert len(lens.positions) == kept
+    assert said in " | ".join(remarks)
+
+
+def test_odd_aspheres_without_odd_powers_and_cylinders(tmp_path):
+    even = surface(1, 0.01, 4.0, "N-BK7 0 0 1.5 40", "6 1", "ODDASPHE", ["PARM 3 0", "PARM 4 1E-5", "PARM 6 1E-7"])
+    scaled = surface(
+        2,
+        -0.01,
+        2.0,
+        "",
+        "6 1",
+        "XOSPHERE",
+        ["XDAT 1 4", "XDAT 2 10.0", "XDAT 3 0", "XDAT 4 0", "XDAT 5 0", "XDAT 6 2.0"],
+    )
+    line = surface(4, 0.0, 3.0, "N-BK7 0 0 1.5 40", "6 1", "TOROIDAL", ["PARM 1 40.0"])
+    other = surface(5, 0.02, 20.0, "", "6 1", "TOROIDAL", ["CONI -0.5", "PARM 1 0"])
+    text = text_of(even, scaled, surface(3, 0.0, 2.0, more=["STOP"]), line, other, surface(6))
+    rows = loaded(write(tmp_path, text))[0].rows
+    r, zero = np.array([1.0, 3.0, 5.0]), np.zeros(3)
+    wanted = 0.01 * r**2 / (1 + np.sqrt(1 - 0.01**2 * r**2)) + 1e-5 * r**4 + 1e-7 * r**6
+    np.testing.assert_allclose(sag(rows[0], zero, r), wanted, rtol=1e-12)
+    assert rows[1].asphere == pytest.approx((2.0e-4,))
+    # a circle of 40 mm turned about an axis at 40 mm, and an ellipse that is moved along x
+    np.testing.assert_allclose(sag(rows[3], r, 2 * r), 40.0 - np.sqrt(40.0**2 - r**2), rtol=1e-12)
+    ellipse = 0.02 * r**2 / (1 + np.sqrt(1 - 0.5 * 0.02**2 * r**2))
+    np.testing.assert_allclose(sag(rows[4], 3 * r, r), ellipse, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("kind", "curvature", "more", "said"),
+    [
+        ("ODDASPHE", 0.01, ["PARM 3 1E-4"], r"surface 1 is of type ODDASPHE with odd powers \(r\^3\)"),
+        ("XOSPHERE", 0.01, ["XDAT 1 5", "XDAT 7 1E-4"], r"of type XOSPHERE with odd powers \(r\^5\)"),
+        ("XOSPHERE", 0.01, ["XDAT 1 3", "XDAT 6 1E-4"], "XDAT 6 lies beyond the number of terms"),
+        ("TOROIDAL", 0.01, ["PARM 1 40"], "surface 1 is a toroid with a curvature in both meridians"),
+        ("TOROIDAL", 0.01, ["PARM 3 1E-4"], r"surface 1 is a toroid with terms \(PARM 3\)"),
+    ],
+)
+def test_shapes_that_a_surface_cannot_have_are_refused(tmp_path, kind, curvature, more, said):
+    text = text_of(
+        surface(1, curvature, 4.0, "N-BK7 0 0 1.5 40", "6 1", kind, more),
+        surface(2, 0.0, 2.0), surface(3, 0.0, 20.0, more=["STOP"]), surface(4),
+    )  # fmt: skip
+    with pytest.raises(LensError, match=said):
+        loaded(write(tmp_path, text))

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ...errors import FlarewrightError, naming
-from ..common import APERTURES_HELP, aperture_reading, error_data, print_json
+from ..common import APERTURES_HELP, FIRST_COLUMN_HELP, aperture_reading, error_data, first_column_reading, print_json
 
 EPILOG = "Example:\n\nflarewright lens check my-lenses/*.lens"
 
@@ -16,6 +16,7 @@ EPILOG = "Example:\n\nflarewright lens check my-lenses/*.lens"
 def check(
     files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Lens files or shipped names.")],
     apertures: Annotated[str | None, typer.Option(metavar="KIND", help=APERTURES_HELP)] = None,
+    first_column: Annotated[str | None, typer.Option(metavar="KIND", help=FIRST_COLUMN_HELP)] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Check lens files and list repairs; exit code 2 if any is rejected."""
@@ -23,13 +24,13 @@ def check(
     from ...io.images.mask_image import read_mask
     from ...render.scene.resolve import first_order, open_lens
 
-    reading = aperture_reading(apertures)
+    reading, column = aperture_reading(apertures), first_column_reading(first_column)
     results: list[dict[str, Any]] = []
     for file in files:
         try:
             # one file's fault never ends the check of the others
             with sentences_for(file, "a lens"):
-                opened = open_lens(file, apertures=reading)
+                opened = open_lens(file, apertures=reading, first_column=column)
                 lens = opened.lens
                 order = first_order(lens)
                 if lens.iris.mask is not None:

@@ -9,4 +9,5 @@
 - `preview`: the PNG: options, exposure, file
 - `shot_command`: `shot`, the frames of a moving project
 - `ghosts_command`: `ghosts`, the ghost analysis of a lens
+- `ghost_sweep`: its `--sweep` over fields, wavelengths and f-numbers
 """

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -15,11 +17,12 @@ from ..option_record import with_options
 
 if TYPE_CHECKING:
     from ...model import Lens, Project
-    from ...optics.rays.ghost_table import GhostRow, GhostTable
+    from ...optics.rays.ghost_table import GhostQuery, GhostRow, GhostTable
 
 EPILOG = (
     "Examples:\n\nflarewright ghosts heliar-tronnier --light 10,0\n\n"
-    "flarewright ghosts my.toml --light 0,0 --coating quarter-wave:550 --fstop 8 --json"
+    "flarewright ghosts my.toml --light 0,0 --coating quarter-wave:550 --fstop 8 --json\n\n"
+    "flarewright ghosts heliar-tronnier --light 10,0 --sweep field=0:25:5 --sweep fstop=3.5,8"
 )
 
 
@@ -76,6 +79,15 @@ class GhostsOptions:
         None
     )
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False
+    sweep: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="AXIS=VALUES",
+            help="Repeat over field=0:30:5, wavelength=450,550,650 or fstop=2.8,8, and rank the surfaces by what a "
+            "better coating gains.",
+        ),
+    ] = None
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print a table of comma-separated values.")] = False
 
 
 @with_options(GhostsOptions)
@@ -105,6 +117,10 @@ def ghosts(options: GhostsOptions) -> None:
         light.field_deg, light.distance, options.wavelength_nm, quality.paths,
         SensorMirror(reflectance) if reflectance > 0.0 else None, quality.orders, quality.order4_limit,
     )  # fmt: skip
+    if options.sweep:
+        print_remarks(dict.fromkeys((*opened.remarks, *settled.remarks)))
+        _sweep(options, project, query, opened.lens.name)
+        return
     table, found = find_ghosts(settled.lens, settled.order, settled.coating, query)
     veil = None
     if options.glare:
@@ -112,6 +128,9 @@ def ghosts(options: GhostsOptions) -> None:
 
         veil = veiling_glare(project, options.wavelength_nm)
     print_remarks(dict.fromkeys((*opened.remarks, *settled.remarks, *found)))
+    if options.as_csv:
+        print(ghost_csv(table, options.brightest), end="")
+        return
     if options.as_json:
         print_json(ghost_data(table, options.brightest) | ({} if veil is None else {"veiling_glare": asdict(veil)}))
         return
@@ -151,9 +170,44 @@ def _project_of(options: GhostsOptions) -> Callable[[Lens], Project]:
         "quality": {"paths": options.paths, "orders": options.orders, "order4_limit": options.order4_limit},
         "zoom": options.zoom,
     }
+    if options.as_csv and (options.as_json or options.glare):
+        raise ProjectError(
+            f"--csv prints a table of ghosts, which cannot hold {'--json' if options.as_json else '--glare'}; keep one"
+        )
+    _check_sweep(options)
     if settings["scatter"] is not None and not options.glare:
         raise ProjectError("--scatter, --surface-roughness and --cleanliness change the glare only; add --glare")
     return lambda lens: project_of({"lens": lens, **settings})
+
+
+def _check_sweep(options: GhostsOptions) -> None:
+    from .ghost_sweep import sweep_axes
+
+    sweep_axes(options.sweep or ())
+    if options.sweep and (options.glare or options.brightest is not None):
+        raise ProjectError(
+            f"--sweep lists points and surfaces, without {'--glare' if options.glare else '--brightest'}; leave it out"
+        )
+
+
+def _sweep(options: GhostsOptions, project: Project, query: GhostQuery, name: str) -> None:
+    """Analyse the ghosts at every point of a sweep, and print the result."""
+    from ...workflow.ghost_sweep import along, surface_gains, sweep_ghosts
+    from .ghost_sweep import print_sweep, sweep_axes, sweep_csv, sweep_data
+
+    axes = sweep_axes(options.sweep or ())
+    fields = (query.field_deg,) if axes.field is None else along(query.field_deg, axes.field)
+    points = tuple(
+        sweep_ghosts(project, query, fields, axes.wavelength or (query.wavelength_nm,), axes.fstop or (options.fstop,))
+    )
+    if options.as_csv:
+        print(sweep_csv(points), end="")
+        return
+    gains = surface_gains(points)
+    if options.as_json:
+        print_json(sweep_data(points, gains))
+    else:
+        print_sweep(name, points, gains)
 
 
 def ghost_data(table: GhostTable, brightest: int | None = None) -> dict[str, Any]:
@@ -186,6 +240,39 @@ def ghost_data(table: GhostTable, brightest: int | None = None) -> dict[str, Any
             for row in table.ghosts[:brightest]
         ],
     }
+
+
+def ghost_csv(table: GhostTable, brightest: int | None = None) -> str:
+    """Return the analysis as comma-separated values: a header, the direct image, then the ghosts as in `ghost_data`.
+
+    Parameters
+    ----------
+    table : GhostTable
+    brightest : int, optional
+        Largest number of ghosts; None: all.
+
+    Returns
+    -------
+    str
+        Numbers have all their digits, unknown ones are empty; lines end with a line feed.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    columns = (
+        "path", "throughput_mm2", "of_direct", "centroid_x_mm", "centroid_y_mm", "rms_radius_mm", "peak_irradiance",
+        "peak_patch_mm", "bounded_by", "focus_distance_mm",
+    )  # fmt: skip
+    writer.writerow(columns)
+    direct = table.direct.throughput_mm2
+    for row in (table.direct, *table.ghosts[:brightest]):
+        part = row.throughput_mm2 / direct if direct > 0.0 else math.nan
+        values = (
+            row.throughput_mm2, part, *row.centroid_mm, row.rms_radius_mm, row.peak_irradiance, row.peak_patch_mm,
+            row.bounded_by, row.focus_distance_mm,
+        )  # fmt: skip
+        cells = ("" if isinstance(value, float) and not math.isfinite(value) else value for value in values)
+        writer.writerow((row.name, *cells))
+    return text.getvalue()
 
 
 def _print_table(table: GhostTable, name: str, angles: tuple[float, float], brightest: int | None) -> None:

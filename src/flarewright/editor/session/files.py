@@ -13,7 +13,7 @@ from ... import __version__
 from ...errors import FlarewrightError, LensError, OutputError, ProjectError
 from ...io.files.atomic_write import write_atomically
 from ...io.files.door import expanded, outside
-from ...io.files.file_kind import kind_of
+from ...io.files.file_kind import LENS_SUFFIXES, kind_of
 from ...io.files.text_file import read_toml
 from ...io.images.exr import write_exr
 from ...io.images.half import exr_scale
@@ -22,7 +22,6 @@ from ...io.lens.library import lens_path, library_names, near_names
 from ...io.measurement.ghost_model_file import is_ghost_model_file
 from ...io.project.look_file import look_text, read_look
 from ...io.project.project_file import project_from_data, project_text, read_project
-from ...io.project.project_text import LENS_SUFFIXES
 from ...measure.replay.measured_project import is_measured, render_any, with_sensor
 from ...model import Camera, Iris, Lens, Light, Look, Project
 from ...render.scene.looks import look_of
@@ -199,8 +198,8 @@ def imported(
     plain = Path(name).name or "dropped"
     if suffix not in (*LENS_SUFFIXES, *PICTURES):
         raise LensError(
-            f"{plain} cannot be opened here: drop a lens (.toml, .lens, .zmx), a measured flare (.json), a project or "
-            "a look (.toml), or a background picture (.exr, .png, .jpg)"
+            f"{plain} cannot be opened here: drop a lens (.toml, .lens, .zmx, .seq, .dat, .csv, .json), a measured "
+            "flare (.json), a project or a look (.toml), or a background picture (.exr, .png, .jpg)"
         )
     # a new file name for new contents, so that undo finds the old picture
     folder = folder / hashlib.sha256(data).hexdigest()[:12]

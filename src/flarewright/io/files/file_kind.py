@@ -6,8 +6,21 @@ import re
 from pathlib import Path
 from typing import Any, Literal
 
+from flarewright.errors import FileError
+
+from .door import outside
+
+FOREIGN_LENS_SUFFIXES = (".lens", ".zmx", ".seq", ".dat", ".csv")
+"""Lens files of other programs; `.json` is a lens or a measured flare."""
+LENS_SUFFIXES = (".toml", *FOREIGN_LENS_SUFFIXES, ".json")
+WRITTEN_LENS_SUFFIXES = (".toml", ".zmx", ".lens", ".csv", ".json")
+"""Lens files that `workflow.lens_export` writes."""
+
 Kind = Literal["lens", "look", "project", "scene"]
 
+REALFLARE_KEY, OPTILAND_KEY = "lens_elements", "surface_group"
+# the key that tells them apart stands within so many bytes
+_START = 65536
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
 
@@ -41,7 +54,7 @@ def refuse_other_kind(path: str | Path, table: dict[str, Any], wanted: Kind) -> 
 
 def refuse_lens_suffix(path: str | Path, wanted: Kind) -> None:
     """Raise ValueError when the suffix is that of another program's lens file, which is not TOML."""
-    if Path(path).is_file() and Path(path).suffix.lower() in (".lens", ".zmx"):
+    if Path(path).is_file() and Path(path).suffix.lower() in FOREIGN_LENS_SUFFIXES:
         raise ValueError(f"{path} is a lens file, not a {wanted} file: check it with flarewright lens check {path}")
 
 
@@ -56,6 +69,18 @@ def kind_of(table: dict[str, Any]) -> Kind | None:
     if "cameras" in table:
         kinds.append("scene")
     return kinds[0] if len(kinds) == 1 else None
+
+
+def lens_key(path: str | Path) -> str:
+    """Return the key that makes a JSON file a lens of another program; "" for other files, such as a measured flare."""
+    try:
+        with outside(path, "a JSON file") as file:
+            start = file.read(_START)
+    except FileError:
+        return ""
+    if not start.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
+        return ""
+    return next((key for key in (REALFLARE_KEY, OPTILAND_KEY) if f'"{key}"'.encode() in start), "")
 
 
 def foreign_hint(text: str) -> str:
@@ -74,13 +99,13 @@ def foreign_hint(text: str) -> str:
     start = text[:20000]
     if start.lstrip().startswith("{") and '"lens_elements"' in start:
         return (
-            "is a lens of RealFlare (JSON), which Flarewright does not read: write its lens_elements as rows of a lens "
-            "file (docs/lens-file.md)"
+            "is a lens of RealFlare (JSON): name it with the suffix .json and give it as a lens, as in "
+            "flarewright lens check FILE"
         )
     lines = [line.split() for line in start.splitlines() if line.strip() and not line.lstrip().startswith("#")]
     if len(lines) >= 3 and all(len(words) == 4 and all(map(_NUMBER.fullmatch, words)) for words in lines[:12]):
         return (
-            "is a lens table of pbrt (radius, thickness, index, aperture diameter), which Flarewright does not read: "
-            "write its lines as rows of a lens file (docs/lens-file.md)"
+            "is a lens table of pbrt (radius, thickness, index, aperture diameter): name it with the suffix .dat and "
+            "give it as a lens, as in flarewright lens check FILE"
         )
     return ""

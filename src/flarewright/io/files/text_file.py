@@ -62,7 +62,7 @@ def read_bytes(path: str | Path, what: str, largest: int = LARGEST) -> bytes:
     return data
 
 
-def read_text(path: str | Path, what: str, largest: int = LARGEST) -> str:
+def read_text(path: str | Path, what: str, largest: int = LARGEST, *, foreign: bool = False) -> str:
     """Read a small UTF-8 text file.
 
     Parameters
@@ -70,6 +70,8 @@ def read_text(path: str | Path, what: str, largest: int = LARGEST) -> str:
     path : str or Path
     what, largest
         As in `read_bytes`.
+    foreign : bool
+        Whether a lens of another program is accepted.
 
     Returns
     -------
@@ -88,7 +90,7 @@ def read_text(path: str | Path, what: str, largest: int = LARGEST) -> str:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise FileError(f"{shown(path)} is not UTF-8 text (line {line}): save it as UTF-8") from None
-    if hint := foreign_hint(text):
+    if not foreign and (hint := foreign_hint(text)):
         raise FileError(f"{shown(path)} {hint}")
     return text.replace("\r\n", "\n")
 
@@ -130,14 +132,14 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
             raise FileError(f"{name} is not {what}: its tables are nested too deeply") from None
 
 
-def read_json(path: str | Path, what: str, largest: int = LARGEST) -> Any:
+def read_json(path: str | Path, what: str, largest: int = LARGEST, *, foreign: bool = False) -> Any:
     """Read a JSON file.
 
     Parameters
     ----------
     path : str or Path
-    what, largest
-        As in `read_bytes`.
+    what, largest, foreign
+        As in `read_text`.
 
     Returns
     -------
@@ -149,7 +151,7 @@ def read_json(path: str | Path, what: str, largest: int = LARGEST) -> Any:
     FileError
         The file cannot be read (as in `read_text`) or is not JSON; the message is one sentence.
     """
-    text = read_text(path, what, largest)
+    text = read_text(path, what, largest, foreign=foreign)
     with sentences_for(path, what):
         try:
             return json.loads(text)

@@ -10,6 +10,7 @@ from pathlib import Path
 from flarewright.errors import LensError
 
 from ..files.door import expanded
+from ..files.file_kind import LENS_SUFFIXES
 
 
 @cache
@@ -47,7 +48,7 @@ def lens_path(name_or_path: str | Path) -> Path:
         return path
     if path.is_symlink():
         raise LensError(f"{text} is a broken link: give the path of the file itself")
-    if path.suffix.lower() in (".toml", ".lens", ".zmx") or path.parent != Path():
+    if path.suffix.lower() in LENS_SUFFIXES or path.parent != Path():
         raise LensError(
             f"{text} does not exist: check the path, or choose a shipped lens (flarewright lenses lists them)"
         )

@@ -27,10 +27,10 @@ from flarewright.model.lens.prescription import NO_GLASS
 from flarewright.model.lens.raw_lens import LensReading, RawLens, RawSequence
 
 from ..files.door import shown
-from ..files.file_kind import foreign_hint, refuse_other_kind
+from ..files.file_kind import OPTILAND_KEY, foreign_hint, lens_key, refuse_other_kind
 from ..files.sentences import count, did_you_mean, shorten, summary, validation_sentences
 from ..files.text_file import read_bytes, read_toml
-from . import dotlens, media, zemax
+from . import codev, dotlens, media, optiland, realflare, tables, zemax
 from .coating_text import coating_from
 from .lens_fields import (
     CURVATURE,
@@ -54,20 +54,25 @@ MOST_ROWS = 500
 """Largest number of rows: photographic lenses have up to sixty; longer files are not lenses."""
 
 
-def read_lens(path: str | Path) -> LensReading | RawLens | RawSequence:
+def read_lens(
+    path: str | Path, first_column: codev.FirstColumn | None = None
+) -> LensReading | RawLens | RawSequence:  # fmt: skip
     """Read a lens file of any known kind.
 
     Parameters
     ----------
     path : str or Path
         `.toml` is our own format; `.lens` is a text table that several flare tools share; `.zmx` is a sequential file
-        of Zemax.
+        of Zemax, `.seq` one of CODE V; `.dat` is a lens of pbrt, `.csv` a table, `.json` a lens of RealFlare or
+        of Optiland.
+    first_column : {"radii", "curvatures"}, optional
+        Of a `.seq` file that does not state it.
 
     Returns
     -------
     LensReading or RawLens or RawSequence
         `optics.lens_import.patent_repair` makes a lens of a `.lens` file, `optics.lens_import.sequential_import` of a
-        `.zmx` file.
+        `RawSequence`.
 
     Raises
     ------
@@ -79,6 +84,14 @@ def read_lens(path: str | Path) -> LensReading | RawLens | RawSequence:
         return dotlens.read_dotlens(path)
     if suffix == ".zmx":
         return zemax.read_zmx(path)
+    if suffix == ".seq":
+        return codev.read_seq(path, first_column)
+    if suffix == ".dat":
+        return tables.read_dat(path)
+    if suffix == ".csv":
+        return tables.read_csv_table(path)
+    if suffix == ".json" and (key := lens_key(path)):
+        return optiland.read_optiland(path) if key == OPTILAND_KEY else realflare.read_realflare(path)
     if suffix == ".toml" or Path(path).is_dir() or not Path(path).exists():
         return read_lens_toml(path)
     with suppress(FileError):
@@ -89,7 +102,10 @@ def read_lens(path: str | Path) -> LensReading | RawLens | RawSequence:
             f"{path} is JSON, not a lens file: a measured flare has no prescription; flarewright render, "
             "predict and edit accept it, and so does render_measured in Python"
         )
-    raise LensError(f"{path} is of an unknown kind: Flarewright reads .toml (its own), .lens and .zmx files")
+    raise LensError(
+        f"{path} is of an unknown kind: Flarewright reads .toml (its own), .lens, .zmx, .seq, .dat, .csv and "
+        "the .json files of RealFlare and Optiland"
+    )
 
 
 def read_lens_toml(path: str | Path) -> LensReading:

@@ -7,7 +7,7 @@ the keywords without effect on a ghost; a remark names every other one. `optics.
 lens of the result.
 
 Source: published files of lens makers and vendors; the sag of each surface type is that of the
-OpticStudio help ("Even Asphere", "Extended Asphere", "Biconic").
+OpticStudio help ("Even Asphere", "Extended Asphere", "Biconic", "Toroidal").
 """
 
 from __future__ import annotations
@@ -22,14 +22,15 @@ from pydantic import ValidationError
 from flarewright.errors import FileError, GlassError, LensError
 from flarewright.model import Medium, Surface
 from flarewright.model.lens.prescription import MOST_TERMS
-from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
+from flarewright.model.lens.raw_lens import Configuration, RawSequence, SequenceRow
 
 from ..files.door import sentences_for, shown
 from ..files.sentences import did_you_mean, shorten, summary, validation_sentences
 from ..files.text_file import read_bytes
 from . import media
 from .glass_catalogue import CatalogueGlass, by_name, same_name
-from .lens_fields import ROW_NUMBERS
+from .lens_fields import CURVATURE, ROW_NUMBERS
+from .zemax_configurations import configurations
 from .zemax_keywords import APERTURES, HARMLESS, HARMLESS_OF_SURFACE, USED, USED_OF_SURFACE, VIGNETTING
 from .zemax_text import Block, Text, decoded, grouped, number_of
 
@@ -125,11 +126,16 @@ def _sequence(path: Path, found: Text) -> RawSequence | None:
     distance = _length(found.blocks[0], "DISZ", found.problems, infinite=math.inf) * mm
     stops = [row for row in rows if row is not None and row.stop]
     stated = stops[0].surface.semi_diameter if stops else None
+    one = Configuration(
+        number=1, **aperture, stop_semi_diameter=stated, field_deg=field_deg, image_height=image_height,
+        focus_distance=None if not 0.0 < distance < 1e9 else distance,
+    )  # fmt: skip
+    several = configurations(found, one, stops[0].number if stops else None, mm)
     return RawSequence(
         file=shown(path.name), name=" ".join(" ".join(found.head.get("NAME", [])).split()) or shown(path.stem),
         notes=" ".join(note for note in found.notes if note), rows=tuple(row for row in rows if row is not None),
         stop_semi_diameter=stated, field_deg=field_deg, image_height=image_height, **aperture,
-        focus_distance=None if not 0.0 < distance < 1e9 else distance,
+        focus_distance=one.focus_distance, configurations=several,
         remarks=(*found.remarks, *media.remarks(findings, "surface")),
     )  # fmt: skip
 
@@ -146,6 +152,8 @@ def _row(
         return None
     thickness = _gap(block, found) * mm
     values = _shape(block, mm, found) | {"thickness": thickness, "semi_diameter": _rim(block, mm, found)}
+    if refusal := CURVATURE.refuse(values.get("curvature", 0.0)):
+        problems.append(f"{where}: the curvature {refusal}")
     if glass:
         values["medium"] = _medium(block.number, glass, found, findings)
         if thickness < 0.0:
@@ -189,7 +197,10 @@ def _shape(block: Block, mm: float, found: Text) -> dict[str, object]:
     where, problems = f"surface {block.number}", found.problems
     curvature = _number(block, "CURV", problems) / mm
     conic = _number(block, "CONI", problems)
-    used = {"EVENASPH": "PARM", "XASPHERE": "PARM, XDAT", "BICONICX": "PARM", "COORDBRK": "PARM"}.get(block.kind, "")
+    used = {
+        "EVENASPH": "PARM", "XASPHERE": "PARM, XDAT", "BICONICX": "PARM", "COORDBRK": "PARM", "TOROIDAL": "PARM, XDAT",
+        "ODDASPHE": "PARM", "XOSPHERE": "PARM, XDAT",
+    }.get(block.kind, "")  # fmt: skip
     for key, numbers in (("PARM", block.parameters), ("XDAT", block.extra)):
         if key not in used and any(numbers.values()):
             found.remarks.append(f"{where}: {key} has no meaning for the type {block.kind[:40]}; left out")
@@ -208,6 +219,8 @@ def _shape(block: Block, mm: float, found: Text) -> dict[str, object]:
         return {
             "curvature": curvature, "conic": conic, "curvature_x": 1.0 / radius if radius else 0.0, "conic_x": conic_x
         }  # fmt: skip
+    if block.kind == "TOROIDAL":
+        return _toroid(block, curvature, conic, mm, problems)
     if block.kind == "EVENASPH":
         terms = {n: block.parameters.get(n, 0.0) for n in block.parameters if n > 0}
     elif block.kind == "XASPHERE":
@@ -219,13 +232,49 @@ def _shape(block: Block, mm: float, found: Text) -> dict[str, object]:
         if plain and any(terms.values()) and any(terms.get(n) != value for n, value in plain.items()):
             problems.append(f"{where} has different terms in PARM and in XDAT: remove those that are wrong")
         terms |= plain
+    elif block.kind in ("ODDASPHE", "XOSPHERE"):
+        terms = _even_terms(block, problems)
     else:
         problems.append(
-            f"{where} is of type {block.kind[:40]}; known are STANDARD, EVENASPH, XASPHERE, BICONICX and an idle "
-            "COORDBRK"
+            f"{where} is of type {block.kind[:40]}; known are STANDARD, EVENASPH, XASPHERE, BICONICX, TOROIDAL, "
+            "ODDASPHE, XOSPHERE and an idle COORDBRK"
         )
         return {}
     return _asphere(where, curvature, conic, {n: value / mm ** (2 * n - 1) for n, value in terms.items()}, problems)
+
+
+def _even_terms(block: Block, problems: list[str]) -> dict[int, float]:
+    """Return the terms of r^2, r^4, ... of an odd asphere; refuse odd powers, which no surface of a lens has here."""
+    unit = block.extra.get(2, 1.0) or 1.0
+    powers = {n - 2: value / unit ** (n - 2) for n, value in block.extra.items() if n > 2}
+    if beyond := [n + 2 for n, value in powers.items() if value and n > block.extra.get(1, 0.0)]:
+        problems.append(f"surface {block.number}: XDAT {beyond[0]} lies beyond the number of terms that XDAT 1 states")
+    powers |= {n: value for n, value in block.parameters.items() if n > 0 and value}
+    if odd := [f"r^{n}" for n, value in powers.items() if n % 2 and value]:
+        problems.append(
+            f"surface {block.number} is of type {block.kind} with odd powers ({', '.join(odd[:4])}), which are not "
+            "supported: fit an even asphere to it"
+        )
+    return {n // 2: value for n, value in powers.items() if n % 2 == 0 and value}
+
+
+def _toroid(block: Block, curvature: float, conic: float, mm: float, problems: list[str]) -> dict[str, object]:
+    """Return a cylinder, whose sag is that of a surface with a curvature in each meridian; refuse other toroids.
+
+    The conic of the y-z plane turns about an axis parallel to y at the radius of parameter 1. If that radius is
+    infinite (0) or the conic is a line, the sag depends on one coordinate, and both descriptions agree.
+    """
+    where, radius = f"surface {block.number}", block.parameters.get(1, 0.0) * mm
+    terms = [f"PARM {n}" for n, value in block.parameters.items() if 2 <= n <= 8 and value]
+    terms += [f"XDAT {n}" for n, value in block.extra.items() if value]
+    if terms:
+        problems.append(f"{where} is a toroid with terms ({', '.join(terms[:3])}), which are not supported")
+    elif radius and curvature:
+        problems.append(
+            f"{where} is a toroid with a curvature in both meridians, which is not supported: give a cylinder, or a "
+            "BICONICX surface of the same curvatures"
+        )
+    return {"curvature": curvature, "conic": conic, "curvature_x": 1.0 / radius if radius else 0.0, "conic_x": 0.0}
 
 
 def _asphere(
@@ -352,9 +401,6 @@ def _remark_ignored(found: Text) -> None:
         if places:
             found.remarks.append(f"surface{'s'[: len(places) > 1]} {', '.join(places)}: {remark}")
     _remark_unknown(found)
-    configurations = number_of((found.head.get("MNUM") or ["1"])[0]) or 1.0
-    if configurations > 1.0:
-        found.remarks.append(f"the file holds {configurations:g} configurations; the active one was read")
     if _number(found.blocks[-1], "CURV", found.problems) != 0.0:
         found.remarks.append("the image surface is curved; the sensor is flat")
 
@@ -377,7 +423,9 @@ def _remark_unknown(found: Text) -> None:
     for key, at in places.items():
         hint = did_you_mean(key, USED_OF_SURFACE)
         found.remarks.append(f"surface{'s'[: len(at) > 1]} {', '.join(at)}: keyword {shorten(key)} is left out{hint}")
-    head = [key for key in found.head if key not in USED | HARMLESS]
+    # with several configurations, a remark on each of them says what its rows change
+    rows = {operand.key for operand in found.operands if operand.configuration > 1}
+    head = [key for key in found.head if key not in USED | HARMLESS | rows]
     if head:
         near = "".join(did_you_mean(key, USED) for key in head[:1])
         more = f" and {len(head) - _LISTED} more" if len(head) > _LISTED else ""

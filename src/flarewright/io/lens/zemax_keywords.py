@@ -1,6 +1,7 @@
 """Keywords of `.zmx` files: those that the reader uses, and those without effect on a ghost.
 
-`zemax` names every other keyword in a remark. Source: the files of makers and vendors, and the OpticStudio help.
+`zemax` names every other keyword in a remark; `zemax_configurations` reads the rows of the table of configurations.
+Source: the files of makers and vendors, and the OpticStudio help.
 """
 
 from __future__ import annotations
@@ -20,10 +21,16 @@ HARMLESS = frozenset({
     # version, display, ray aiming, sampling and weights of its analyses, settings of non-sequential parts, stock number
     "VERS", "PFIL", "LANG", "PICB", "SDMA", "OMMA", "HYPR", "ROPD", "RAIM", "FWGN", "FWGT", "WWGT", "WWGN", "POLS",
     "GLRS", "GSTD", "NSCD", "COFN", "GFAC", "DBDT", "PUSH",
-    # tolerances, and rows of its table of configurations, of which a remark states the number
+    # tolerances, and rows of the table of configurations, which `zemax_configurations` reads
     "TOL", "MOFF", "BLNK", "SDIA", "THIC", "CRVT", "CONN", "PRAM", "YFIE", "XFIE", "STPS", "APER", "MCOM",
     *VIGNETTING,
 })  # fmt: skip
+
+IDLE_OPERANDS = frozenset({"MOFF", "BLNK", "MCOM", "FLWT", "WLWT", "FVDX", "FVDY", "FVCX", "FVCY", "FVAN", "SATP"})
+"""Rows of the table of configurations without effect on a ghost: comments, weights, vignetting factors."""
+
+RIM_OPERANDS = frozenset({"SDIA", "APMN", "APMX", "APTP", "APDX", "APDY", "CHZN", "MCSD"})
+"""Rows of that table that change rims; a remark names their surfaces."""
 
 USED_OF_SURFACE = frozenset({
     "TYPE", "CURV", "CONI", "PARM", "XDAT", "DISZ", "GLAS", "DIAM", "CLAP", "FLAP", "COAT", "STOP",

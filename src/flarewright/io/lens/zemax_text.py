@@ -30,6 +30,16 @@ class Block:
         return (self.words.get("TYPE") or ["STANDARD"])[0].upper()
 
 
+@dataclass(frozen=True)
+class Operand:
+    """One cell of the table of configurations: `THIC 5 2 1.5` is 1.5 behind surface 5 in configuration 2."""
+
+    key: str
+    place: int
+    configuration: int
+    value: str
+
+
 @dataclass
 class Text:
     """The lines of the file, grouped."""
@@ -40,6 +50,7 @@ class Text:
     problems: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     wavelengths_um: dict[int, float] = field(default_factory=dict)
+    operands: list[Operand] = field(default_factory=list)
     commas: int = 0
 
     @property
@@ -82,12 +93,21 @@ def grouped(text: str) -> Text:
                 found.wavelengths_um[int(words[1])] = number_of(words[2]) or 0.0
             elif key in ("WAVL", "WAVN"):
                 found.wavelengths_um |= {k: number_of(word) or 0.0 for k, word in enumerate(words[1:], 1)}
+            # the rows of the table of configurations follow its size
+            if "MNUM" in found.head and (operand := _operand(key, words)) is not None:
+                found.operands.append(operand)
             found.head.setdefault(key, line.split(maxsplit=1)[1:] if key == "NAME" else words[1:])
         elif found.blocks:
             _of_surface(found.blocks[-1], key, words[1:], found)
     if found.commas:
         found.remarks.append(f"{count(found.commas, 'number')} with a decimal comma, read as a decimal point")
     return found
+
+
+def _operand(key: str, words: list[str]) -> Operand | None:
+    if len(words) < 4 or key == "TOL" or not (words[1].isdecimal() and words[2].isdecimal()):
+        return None
+    return Operand(key, int(words[1]), int(words[2]), words[3])
 
 
 def _with_points(words: list[str], found: Text) -> list[str]:

@@ -14,6 +14,7 @@ from ...model.measurement.ghost_model import GhostModel
 from ...model.measurement.ghost_tracks import Tracks
 from ...model.measurement.replay_camera import ReplayCamera
 from ..files.atomic_write import write_atomically
+from ..files.file_kind import lens_key
 from ..files.sentences import summary
 from ..files.text_file import LARGEST, check_version, read_json
 from ..files.type_slips import record_of
@@ -42,8 +43,9 @@ def _read(path: str | Path, what: str, record: type[Record], largest: int = LARG
 
 
 def is_ghost_model_file(what: object) -> bool:
-    """Return whether an argument given as a lens is a measured flare: lens files are never JSON."""
-    return isinstance(what, str) and what.lower().endswith(".json") and Path(what).is_file()
+    """Return whether an argument given as a lens is a measured flare: JSON that is no lens of another program."""
+    is_json = isinstance(what, str) and what.lower().endswith(".json") and Path(what).is_file()
+    return is_json and not lens_key(str(what))
 
 
 def read_ghost_model(path: str | Path) -> GhostModel:

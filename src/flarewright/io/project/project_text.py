@@ -11,11 +11,9 @@ from ...errors import ProjectError
 from ...model import Art, Dirt, Light, Starburst, Timeline
 from ...model.project import project as choices
 from ...model.project.project import CoatingChoice, Project
+from ..files.file_kind import LENS_SUFFIXES
 from ..lens.coating_text import UNCOATED, format_coating
 from .spectrum_text import spectrum_text
-
-LENS_SUFFIXES = (".toml", ".lens", ".json", ".zmx", ".seq")
-"""Suffixes of lens files; any other word without a slash is a name of the library."""
 
 HOLDOUT_FILES = ("image", "depth")
 FILES = (("iris", "mask"), ("dirt", "image"), ("holdout", *HOLDOUT_FILES))

@@ -110,6 +110,31 @@ class SequenceRow(Frozen):
     automatic_rim: bool = False
 
 
+class Configuration(Frozen):
+    """One setting of a file that holds several: what differs from the file's surfaces.
+
+    Attributes
+    ----------
+    number : int
+        Number in the file, from 1.
+    gaps : tuple of (int, float)
+        Number of a surface and the gap behind it, mm.
+    f_number, entrance_pupil_diameter, stop_semi_diameter, field_deg, image_height : float or None
+        As in `RawSequence`, all of this setting.
+    focus_distance : float or None
+        From the object to the first surface, mm; None: object at infinity.
+    """
+
+    number: int
+    gaps: tuple[tuple[int, float], ...] = ()
+    f_number: float | None = None
+    entrance_pupil_diameter: float | None = None
+    stop_semi_diameter: float | None = None
+    field_deg: float | None = None
+    image_height: float | None = None
+    focus_distance: float | None = None
+
+
 class RawSequence(Frozen):
     """Rows of a sequential ray-trace file; `sequential_import` makes a Lens of it or raises an error with the reason.
 
@@ -127,6 +152,10 @@ class RawSequence(Frozen):
         The largest field, as an angle or as an image height in mm.
     focus_distance : float or None
         From the object to the first of `rows`, mm; None: object at infinity.
+    stated_focal_length : float or None
+        As the file states it, mm.
+    configurations : tuple of Configuration
+        Settings of a zoom or of the focus; empty for a file with one.
     remarks : tuple of str
     """
 
@@ -140,4 +169,6 @@ class RawSequence(Frozen):
     field_deg: float | None = None
     image_height: float | None = None
     focus_distance: float | None = None
+    stated_focal_length: float | None = None
+    configurations: tuple[Configuration, ...] = ()
     remarks: tuple[str, ...] = ()

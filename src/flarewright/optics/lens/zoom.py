@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
-from ...errors import ProjectError
+from ...errors import LensError, ProjectError
 from ...model import Lens, Position
 from .paraxial import first_order
 
@@ -79,7 +79,9 @@ def positioned(lens: Lens, zoom: str | float | None, distance: float | None) -> 
         return lens
     if not lens.positions:
         raise ProjectError(f"{lens.name} has no positions to zoom to; remove the zoom, or give its file [[positions]]")
-    number = None if zoom is None else _number(zoom)
+    # a name such as "66.7 mm" is the position itself, not a focal length to interpolate
+    named = [position for position in lens.positions if position.name.lower() == str(zoom).strip().lower()]
+    number = None if zoom is None or named else _number(zoom)
     if zoom is None:
         settings = _settings(lens)
         if len(settings) > 1:
@@ -87,12 +89,11 @@ def positioned(lens: Lens, zoom: str | float | None, distance: float | None) -> 
         return at_position(lens, _focused(lens, settings[0], distance))
     if number is not None:
         return at_position(lens, _between(lens, number, distance))
-    for position in lens.positions:
-        if position.name.lower() == str(zoom).strip().lower():
-            if distance is None:
-                return at_position(lens, position)
-            mine = next(setting for setting in _settings(lens) if position in setting)
-            return at_position(lens, _focused(lens, mine, distance))
+    for position in named:
+        if distance is None:
+            return at_position(lens, position)
+        mine = next(setting for setting in _settings(lens) if position in setting)
+        return at_position(lens, _focused(lens, mine, distance))
     raise ProjectError(f"{lens.name} has no position {zoom!r}; it has: {_names(lens)}, or give a focal length in mm")
 
 
@@ -173,7 +174,13 @@ def _part(lens: Lens, one: Position, other: Position, focal_length: float) -> fl
     part = 0.0
     for _ in range(STEPS):
         part = 0.5 * (low + high)
-        efl = first_order(at_position(lens, interpolated_position(lens, one, other, part))).efl
+        try:
+            efl = first_order(at_position(lens, interpolated_position(lens, one, other, part))).efl
+        except LensError:
+            raise ProjectError(
+                f"{lens.name} forms no image on the straight path between its positions {one.name!r} and "
+                f"{other.name!r}; choose one of them by its name"
+            ) from None
         if abs(efl / focal_length - 1.0) < CLOSE:
             break
         low, high = (part, high) if efl < focal_length else (low, part)

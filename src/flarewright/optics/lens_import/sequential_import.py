@@ -6,13 +6,17 @@ becomes a separate row, and the f-number follows from the aperture specification
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import atan, degrees
+
+from pydantic import ValidationError
 
 from ...errors import LensError
 from ...model import Lens, Row, Stop, Surface
-from ...model.lens.prescription import NO_GLASS
+from ...model.lens.prescription import LARGEST_F_NUMBER, LEAST_F_NUMBER, NO_GLASS
 from ...model.lens.raw_lens import LensReading, RawSequence, SequenceRow
 from ..lens.paraxial import FirstOrder, first_order
+from .configurations import Setting, positions_of
 
 # threshold for a remark: distance of the stated image from the focus, part of the focal length
 IMAGE_OFF = 0.02
@@ -43,7 +47,7 @@ def lens_of_sequence(raw: RawSequence) -> LensReading:
     draft = Lens(name=raw.name, source=f"from {raw.file}", f_number=TRIAL, rows=tuple(rows))
     order = _order(raw, draft)
     f_number = _f_number(raw, order, remarks)
-    if not 0.3 < f_number <= 256.0:
+    if not LEAST_F_NUMBER < f_number <= LARGEST_F_NUMBER:
         raise LensError(f"{raw.file}: its f-number would be f/{f_number:.3g}, out of range for a lens: set FNUM")
     _remark_image(kept[-1], order, remarks)
     rows = _within_spheres(rows, remarks)
@@ -51,10 +55,44 @@ def lens_of_sequence(raw: RawSequence) -> LensReading:
     distance = None if raw.focus_distance is None else raw.focus_distance + front
     if distance is not None:
         remarks.append(f"the object lies {distance:g} mm in front of the lens; it is focused there")
-    lens = draft.replace(rows=tuple(rows), f_number=f_number, field_deg=_field_deg(raw, order), focus_distance=distance)
+    lens = draft.replace(
+        rows=tuple(rows), f_number=f_number, field_deg=_field_deg(raw, order), focus_distance=distance,
+        stated_focal_length=raw.stated_focal_length,
+    )  # fmt: skip
+    positions, found = positions_of(lens, tuple(_settings(raw, remarks)))
+    lens = lens.replace(positions=positions)
+    remarks += found
     remarks += raw.remarks
     notes = [f"Imported from {raw.file}.", raw.notes, *remarks]
     return LensReading(lens.replace(notes="\n".join(note for note in notes if note)), tuple(remarks))
+
+
+def _settings(raw: RawSequence, remarks: list[str]) -> Iterator[Setting]:
+    """Return the lens at each configuration of the file; a remark names those that form no lens."""
+    for one in raw.configurations:
+        gaps = dict(one.gaps)
+        try:
+            moved = raw.replace(
+                rows=tuple(
+                    row.replace(surface=row.surface.replace(thickness=gaps[row.number])) if row.number in gaps else row
+                    for row in raw.rows
+                ),
+                f_number=one.f_number, entrance_pupil_diameter=one.entrance_pupil_diameter,
+                stop_semi_diameter=one.stop_semi_diameter, field_deg=one.field_deg, image_height=one.image_height,
+            )  # fmt: skip
+            kept, front = _without_idle(moved, [])
+            distance = None if one.focus_distance is None else one.focus_distance + front
+            rows = tuple(_with_stop(moved, kept, []))
+            order = _order(moved, Lens(name=raw.name, f_number=TRIAL, focus_distance=distance, rows=rows))
+            yield Setting(
+                number=one.number, rows=rows, efl=order.efl, f_number=_f_number(moved, order, []),
+                field_deg=_field_deg(moved, order), focus_distance=distance,
+            )  # fmt: skip
+        except LensError as error:
+            why = str(error).removeprefix(f"{raw.file}: ")
+            remarks.append(f"configuration {one.number} is left out: {why}")
+        except ValidationError as error:
+            remarks.append(f"configuration {one.number} is left out: {error.errors()[0]['msg'].lower()}")
 
 
 def _without_idle(raw: RawSequence, remarks: list[str]) -> tuple[list[SequenceRow], float]:

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from ...errors import GlassError, LensError, ProjectError, naming
 from ...io.files.sentences import summary, validation_sentences
 from ...io.images.height_image import read_heights
+from ...io.lens.codev import FirstColumn
 from ...io.lens.library import in_library, lens_path
 from ...io.lens.media import attach
 from ...io.lens.media import complete_medium as complete_media
@@ -62,16 +63,21 @@ class OpenedLens:
         return (*self.repairs, *_assumed(self.stated, self.lens, self.checked))
 
 
-def open_lens(lens: Lens | str | Path, *, apertures: Apertures = "auto") -> OpenedLens:
+def open_lens(
+    lens: Lens | str | Path, *, apertures: Apertures = "auto", first_column: FirstColumn | None = None
+) -> OpenedLens:  # fmt: skip
     """Read, repair and complete a lens.
 
     Parameters
     ----------
     lens : Lens or str or Path
-        A prescription, the name of a shipped lens (`flarewright lenses`), a TOML lens file, a `.lens` or a `.zmx` file.
+        A prescription, the name of a shipped lens (`flarewright lenses`), or a lens file of any kind that `read_lens`
+        reads.
     apertures : {"auto", "diameters", "semi-diameters"}
         What the last column of a `.lens` table holds; "auto" decides by the stop
         (`optics.lens_import.patent_repair.repair`).
+    first_column : {"radii", "curvatures"}, optional
+        The first number of a surface in a `.seq` file that does not state it.
 
     Returns
     -------
@@ -89,7 +95,7 @@ def open_lens(lens: Lens | str | Path, *, apertures: Apertures = "auto") -> Open
         return _opened(LensReading(_with_heights(lens), ()))
     path = lens_path(str(lens))
     # cache the files of shipped lenses only: a user's file can change while a program runs
-    return _shipped(path) if in_library(path) and apertures == "auto" else _read(path, apertures)
+    return _shipped(path) if in_library(path) and apertures == "auto" else _read(path, apertures, first_column)
 
 
 def load_lens(name_or_path: str | Path, *, remarks: list[str] | None = None, apertures: Apertures = "auto") -> Lens:
@@ -123,9 +129,13 @@ def _shipped(path: Path) -> OpenedLens:
     return _read(path, checked=True)
 
 
-def _read(path: Path, apertures: Apertures = "auto", checked: bool = False) -> OpenedLens:
+def _read(
+    path: Path, apertures: Apertures = "auto", first_column: FirstColumn | None = None, checked: bool = False
+) -> OpenedLens:  # fmt: skip
     """Read, repair and complete a lens file."""
-    reading = read_lens(path)
+    if first_column is not None and path.suffix.lower() != ".seq":
+        raise LensError(f"{path} is no .seq file, whose first column can be {first_column}; leave --first-column out")
+    reading = read_lens(path, first_column)
     try:
         with naming(path):
             if apertures != "auto" and not isinstance(reading, RawLens):

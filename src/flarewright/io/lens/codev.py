@@ -1,0 +1,359 @@
+"""Reader of CODE V sequence files (`.seq`).
+
+Commands are separated by line ends or semicolons; `&` continues a line, `!` begins a comment. The reader uses TITLE,
+DIM, RDM, the aperture (EPD, FNO), the fields (XAN, YAN, XIM, YIM, XRI, YRI), REF and WL, PRV tables of indices, and of
+each surface (SO, S, SI) curvature or radius, thickness and glass, STO, CIR, CON, ASP with K and A to J. Other commands
+that change a surface are errors; remarks name the others. A file without RDM does not state whether its first column
+holds radii or curvatures, so the caller has to.
+
+Source: the sequence files that lens vendors publish, and the command names of the CODE V reference.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from pydantic import ValidationError
+
+from flarewright.errors import FileError, LensError
+from flarewright.model import Medium, Surface
+from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
+
+from ..files.door import sentences_for, shown
+from ..files.sentences import shorten, summary, validation_sentences
+from ..files.text_file import read_bytes
+from . import media
+from .lens_fields import CURVATURE
+from .medium_names import named_medium, numbered_medium
+from .zemax_text import decoded, number_of
+
+FirstColumn = Literal["radii", "curvatures"]
+
+_MM = {"M": 1.0, "MM": 1.0, "C": 10.0, "CM": 10.0, "I": 25.4, "IN": 25.4}
+_MOST_SURFACES = 500
+_INFINITE = 1e9
+# A to H are terms of r^4 to r^18, J is that of r^20
+_TERMS = {letter: k for k, letter in enumerate("ABCDEFGHJ")}
+_FIELDS = ("XAN", "YAN", "XIM", "YIM", "XRI", "YRI", "XOB", "YOB")
+_VIGNETTING = ("VUX", "VLX", "VUY", "VLY")
+# codes and targets of optimization, weights, labels, dates, solves that state their result, tolerances
+_IDLE = frozenset({
+    "LEN", "GO", "INI", "WTW", "WTF", "CCY", "CCX", "THC", "KC", "GLC", "SLB", "PIM", "CUM", "THM", "UMY", "UCY",
+    "HMY", "PIK", "TEM", "PRE", "CA", "SPH", "IC", "DEL", "CUF", "RDF", "FRZ", "WAV", "DER", "END", "NOR", "GL1", "GL2",
+    "MTH", "CLS", "CRA", "POL", "TOL", "DLT", "DLN", "DLR", "DLF", "TIR", "COM", "AFI", "AC", "BC", "CC", "DC", "EC",
+    "FC", "GC", "HC", "JC", "PUY", "PUX",
+})  # fmt: skip
+# what tilts, shifts or shapes a surface, or makes it no refracting one
+_UNSUPPORTED = frozenset({
+    "ADE", "BDE", "CDE", "XDE", "YDE", "ZDE", "ALP", "BET", "GAM", "INC", "SPS", "CYL", "XTO", "YTO", "AAS", "GRT",
+    "DIF", "FRE", "HOE", "GRX", "ARR", "UDS", "ZRN", "SPL", "BEN", "DAR", "REV", "RET", "GLB", "NSS", "CUX", "RDX",
+})  # fmt: skip
+_SHIFTS = frozenset({"ADE", "BDE", "CDE", "XDE", "YDE", "ZDE", "ALP", "BET", "GAM", "CUX", "RDX"})
+_NOT_ROUND = ("REX", "REY", "ELX", "ELY", "ADX", "ADY", "ARO", "POX", "POY")
+_WORDS = re.compile(r"'[^']*'|\"[^\"]*\"|[^\s;]+")
+
+
+@dataclass
+class _Surface:
+    """Words of one surface."""
+
+    number: int
+    words: list[str]
+    stop: bool = False
+    conic: float = 0.0
+    terms: dict[int, float] = field(default_factory=dict)
+    rim: float | None = None
+
+
+@dataclass
+class _Reading:
+    """State of the reader."""
+
+    head: dict[str, list[str]] = field(default_factory=dict)
+    surfaces: list[_Surface] = field(default_factory=list)
+    radii: bool | None = None
+    private: dict[str, list[float]] = field(default_factory=dict)
+    private_nm: list[float] = field(default_factory=list)
+    in_private: bool = False
+    problems: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+    unknown: dict[str, list[str]] = field(default_factory=dict)
+    findings: list[tuple[int, media.Finding]] = field(default_factory=list)
+
+
+def read_seq(path: str | Path, first_column: FirstColumn | None = None) -> RawSequence:
+    """Read a sequence file; each glass gets its dispersion.
+
+    Parameters
+    ----------
+    path : str or Path
+    first_column : {"radii", "curvatures"}, optional
+        What the first number of a surface is if the file does not state it.
+
+    Returns
+    -------
+    RawSequence
+
+    Raises
+    ------
+    LensError
+        When the file cannot be read or is not supported; `problems` gives each surface by its number, the object is 0.
+    """
+    reading = _Reading()
+    try:
+        data = read_bytes(path, "a .seq file")
+        with sentences_for(path, "a .seq file"):
+            for words in _commands(decoded(data)):
+                _command(words, reading)
+            raw = _sequence(Path(path), reading, first_column)
+    except FileError as error:
+        raise LensError(str(error), (str(error),)) from error
+    if raw is None or reading.problems:
+        raise LensError(summary(str(path), reading.problems), tuple(reading.problems))
+    return raw
+
+
+def _commands(text: str) -> list[list[str]]:
+    """Return the words of each command."""
+    lines: list[str] = []
+    continued = False
+    for line in text.splitlines():
+        # an exclamation mark inside quotes is text
+        content = re.sub(r"('[^']*'|\"[^\"]*\")|!.*", lambda found: found[1] or "", line).rstrip()
+        begun = content.removesuffix("&")
+        if continued:
+            lines[-1] += " " + begun.strip()
+        else:
+            lines.append(begun.strip())
+        continued = content.endswith("&")
+    parts = [part for line in lines for part in re.findall(r"(?:'[^']*'|\"[^\"]*\"|[^;'\"]|['\"])+", line)]
+    return [words for part in parts if (words := _WORDS.findall(part))]
+
+
+def _command(words: list[str], reading: _Reading) -> None:
+    key = words[0].upper()
+    if reading.in_private:
+        _private(key, words, reading)
+    elif key == "PRV":
+        reading.in_private = True
+    elif key in ("SO", "S", "SI") or re.fullmatch(r"S\d+", key):
+        reading.surfaces.append(_Surface(len(reading.surfaces), words[1:]))
+    elif key == "RDM":
+        reading.radii = not (len(words) > 1 and words[1].upper().startswith("N"))
+    elif key in ("TIT", "TITLE", "DIM", "EPD", "FNO", "NA", "NAO", "WL", "REF", "ZOO", *_FIELDS, *_VIGNETTING):
+        reading.head.setdefault("TITLE" if key == "TIT" else key, words[1:])
+    elif key == "STO" or (reading.surfaces and key not in _IDLE):
+        _of_surface(key, words[1:], reading)
+    elif key not in _IDLE:
+        reading.unknown.setdefault(key, [])
+
+
+def _private(key: str, words: list[str], reading: _Reading) -> None:
+    """Read one line of a table of indices: the wavelengths, or a glass with its indices."""
+    if key == "END":
+        reading.in_private = False
+        return
+    values = [number_of(word) for word in words[1:]]
+    numbers = [value for value in values if value is not None]
+    if key == "PWL":
+        reading.private_nm = numbers
+    elif len(numbers) == len(values) == len(reading.private_nm) > 1:
+        reading.private[key.strip("'\"")] = numbers
+
+
+def _of_surface(key: str, words: list[str], reading: _Reading) -> None:
+    """Apply a command to the last surface; STO can name another one."""
+    surface = reading.surfaces[-1] if reading.surfaces else None
+    if key == "STO" and words and (named := re.fullmatch(r"[Ss](\d+)", words[0])):
+        number = int(named[1])
+        surface = reading.surfaces[number] if number < len(reading.surfaces) else None
+    if surface is None:
+        reading.problems.append(f"{shorten(' '.join([key, *words]))} names a surface that does not exist")
+        return
+    where = f"surface {surface.number}"
+    if key == "STO":
+        surface.stop = True
+    elif key in ("CON", "ASP"):
+        pass
+    elif key == "K" or key in _TERMS:
+        value = number_of(words[0]) if words else None
+        if value is None:
+            reading.problems.append(f"{where}: {key} is {shorten(' '.join(words))}, a number was expected")
+        elif key == "K":
+            surface.conic = value
+        else:
+            surface.terms[_TERMS[key]] = value
+    elif key == "CIR":
+        _rim(surface, words, reading)
+    elif key in _UNSUPPORTED:
+        if key not in _SHIFTS or any(number_of(word) for word in words):
+            reading.problems.append(f"{where}: {key} tilts, shifts or shapes it in a way that is not supported")
+    else:
+        reading.unknown.setdefault(key, []).append(str(surface.number))
+
+
+def _rim(surface: _Surface, words: list[str], reading: _Reading) -> None:
+    """Read the clear aperture; EDG is the mechanical edge, OBS and HOL stop the middle."""
+    kinds = {word.upper() for word in words}
+    if kinds & {"OBS", "HOL"}:
+        reading.remarks.append(f"surface {surface.number}: annular apertures are treated as open in the middle")
+        return
+    value = number_of(words[-1]) if words else None
+    if value is None or value < 0.0:
+        reading.problems.append(f"surface {surface.number}: CIR is {shorten(' '.join(words))}, a length was expected")
+    elif value > 0.0 and (surface.rim is None or "EDG" not in kinds):
+        surface.rim = value
+
+
+def _sequence(path: Path, reading: _Reading, first_column: FirstColumn | None) -> RawSequence | None:
+    surfaces, problems = reading.surfaces, reading.problems
+    if len(surfaces) < 4:
+        problems.append("the surfaces of object, lens and image (SO, S, SI) are missing: is it a CODE V .seq file?")
+    elif len(surfaces) > _MOST_SURFACES:
+        problems.append(f"it has {len(surfaces)} surfaces, a lens has at most {_MOST_SURFACES}")
+    radii = first_column == "radii" if reading.radii is None else reading.radii
+    if reading.radii is None and first_column is None:
+        problems.append(
+            "the file has no RDM, so the first number of a surface can be its radius or its curvature: give "
+            "--first-column radii or curvatures, or add the line RDM Y or RDM N"
+        )
+    unit = (reading.head.get("DIM") or ["M"])[0].upper()
+    if unit not in _MM:
+        problems.append(f"DIM {unit[:20]} is unknown; known are M (mm), C (cm) and I (inches)")
+    if problems:
+        return None
+    mm = _MM[unit]
+    if mm != 1.0:
+        reading.remarks.append(f"lengths are in {'cm' if mm == 10.0 else 'inches'}; converted to mm")
+    if not any(surface.stop for surface in surfaces):
+        # CODE V's default
+        surfaces[1].stop = True
+        reading.remarks.append("the file has no STO; the stop is surface 1, as in CODE V")
+    rows = [_row(surface, mm, radii, reading) for surface in surfaces[1:-1]]
+    distance = _object_distance(surfaces[0], mm, reading)
+    _remark(reading)
+    if problems:
+        return None
+    kept = tuple(row for row in rows if row is not None)
+    stated = next((row.surface.semi_diameter for row in kept if row.stop), None)
+    title = (reading.head.get("TITLE") or [""])[0].strip("'\"").strip()
+    return RawSequence(
+        file=shown(path.name), name=" ".join(title.split()) or shown(path.stem), rows=kept,
+        stop_semi_diameter=stated, focus_distance=distance, **_opening(reading, mm), **_field(reading, mm),
+        remarks=(*reading.remarks, *media.remarks(reading.findings, "surface")),
+    )  # fmt: skip
+
+
+def _row(surface: _Surface, mm: float, radii: bool, reading: _Reading) -> SequenceRow | None:
+    where, problems = f"surface {surface.number}", reading.problems
+    before = len(problems)
+    first, thickness = [*(number_of(word) for word in surface.words[:2]), None, None][:2]
+    if first is None or thickness is None:
+        problems.append(f"{where}: {shorten(' '.join(surface.words[:2]))} is no {_kind(radii)} and thickness")
+        return None
+    if abs(thickness * mm) >= _INFINITE:
+        problems.append(f"{where}: the gap to the next surface is infinite, so they form no lens: give its length")
+    medium = None
+    rest = surface.words[2:]
+    if any(word.upper() in ("REFL", "REFR:REFL", "TIR") for word in rest):
+        problems.append(f"{where} is a mirror: reflecting surfaces are not supported")
+    elif rest and (medium := _medium(rest[0], surface.number, reading)) is not None and thickness < 0.0:
+        problems.append(f"{where}: glass cannot be {thickness * mm:g} mm thick")
+    curvature = first / mm if not radii else 1.0 / (first * mm) if first else 0.0
+    if refusal := CURVATURE.refuse(curvature):
+        problems.append(f"{where}: the curvature {refusal}")
+    most = max((k for k, value in surface.terms.items() if value), default=-1)
+    if len(problems) > before:
+        return None
+    try:
+        made = Surface(
+            curvature=curvature, conic=surface.conic, thickness=thickness * mm, medium=medium,
+            asphere=tuple(surface.terms.get(k, 0.0) / mm ** (2 * k + 3) for k in range(most + 1)),
+            semi_diameter=None if surface.rim is None else surface.rim * mm,
+        )  # fmt: skip
+    except ValidationError as error:
+        problems += [f"{where}: {sentence}" for sentence in validation_sentences(error)]
+        return None
+    return SequenceRow(number=surface.number, surface=made, stop=surface.stop)
+
+
+def _kind(radii: bool) -> str:
+    return "radius" if radii else "curvature"
+
+
+def _medium(word: str, number: int, reading: _Reading) -> Medium | None:
+    """Return the medium of a glass, of a PRV table by its indices at the d, F and C lines."""
+    indices = reading.private.get(word.strip("'\"").upper())
+    if indices is None:
+        return named_medium(word, f"surface {number}", reading.problems, reading.findings, number)
+    n_d, n_f, n_c = (_index(reading.private_nm, indices, line_nm) for line_nm in (587.5618, 486.1327, 656.2725))
+    v_d = (n_d - 1.0) / (n_f - n_c) if n_f > n_c else None
+    return numbered_medium(None, n_d, v_d, f"surface {number}", reading.problems, reading.findings, number)
+
+
+def _index(wavelengths_nm: list[float], indices: list[float], line_nm: float) -> float:
+    """Return an index between tabulated ones, linear in 1 / wavelength^2 as in Cauchy's formula."""
+    pairs = sorted(zip((1.0 / nm**2 for nm in wavelengths_nm), indices, strict=True))
+    at = 1.0 / line_nm**2
+    k = min(max(sum(x < at for x, _ in pairs), 1), len(pairs) - 1)
+    (x0, y0), (x1, y1) = pairs[k - 1], pairs[k]
+    return y0 + (y1 - y0) * (at - x0) / (x1 - x0) if x1 != x0 else y0
+
+
+def _object_distance(surface: _Surface, mm: float, reading: _Reading) -> float | None:
+    value = number_of(surface.words[1]) if len(surface.words) > 1 else None
+    if len(surface.words) > 2 and surface.words[2].upper() not in ("AIR", "REFR"):
+        reading.problems.append(
+            "surface 0: the lens stands in a medium: Flarewright traces light that comes through air"
+        )
+    return None if value is None or not 0.0 < value * mm < _INFINITE else value * mm
+
+
+def _opening(reading: _Reading, mm: float) -> dict[str, float | None]:
+    for key, name, unit in (("FNO", "f_number", 1.0), ("EPD", "entrance_pupil_diameter", mm)):
+        words = reading.head.get(key)
+        value = number_of(words[0]) if words else None
+        if value is not None and value > 0.0:
+            return {name: value * unit}
+    return {}
+
+
+def _field(reading: _Reading, mm: float) -> dict[str, float | None]:
+    """Return the largest field as an angle or an image height."""
+    columns = {key: [number_of(word) or 0.0 for word in reading.head.get(key, [])] for key in _FIELDS}
+    for axes, name in (
+        (("XAN", "YAN"), "field_deg"),
+        (("XIM", "YIM"), "image_height"),
+        (("XRI", "YRI"), "image_height"),
+    ):
+        x, y = (columns[axis] for axis in axes)
+        count = max(len(x), len(y))
+        pairs = zip(x + [0.0] * (count - len(x)), y + [0.0] * (count - len(y)), strict=True)
+        largest = max((math.hypot(*pair) for pair in pairs), default=0.0)
+        if largest > 0.0 and (name != "field_deg" or largest < 90.0):
+            return {name: largest * (1.0 if name == "field_deg" else mm)}
+    return {}
+
+
+def _remark(reading: _Reading) -> None:
+    """Append remarks on what the file states and the lens does not hold."""
+    if any(number_of(word) for key in _VIGNETTING for word in reading.head.get(key, [])):
+        reading.remarks.append("vignetting factors (VUX to VLY) are left out; the rims vignette")
+    if "ZOO" in reading.head:
+        reading.remarks.append("the zoom positions (ZOO) are left out; the lens is that of the surfaces")
+    for key in ("NA", "NAO"):
+        if key in reading.head:
+            reading.remarks.append(f"the numerical aperture ({key}) is left out")
+    places = [n for key in _NOT_ROUND for n in reading.unknown.pop(key, [])]
+    if places:
+        reading.remarks.append(f"surface {', '.join(places)}: apertures that are not round are left out")
+    for key, at in reading.unknown.items():
+        where = f"surface{'s'[: len(at) > 1]} {', '.join(at)}: " if at else ""
+        reading.remarks.append(f"{where}command {shorten(key)} is left out")
+
+
+__all__ = ["FirstColumn", "read_seq"]

@@ -1,0 +1,161 @@
+"""Sequence files of CODE V: the numbers of the file, or an error with the reason."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from flarewright.cli.app import run
+from flarewright.errors import LensError
+from flarewright.model import Stop
+from flarewright.optics.lens.paraxial import first_order
+from flarewright.render.scene.resolve import open_lens
+
+DOUBLET = """\
+RDM;LEN       "VERSION: 11.2       made up for a test"
+TITLE 'Achromat; 100 mm' ! a comment
+EPD   25.0
+DIM   M
+WL    656.3 587.6 486.1
+REF   2
+XAN   0.0 0.0
+YAN   0.0 5.0
+VUY   0.0 0.2
+SO    0.0 0.1e14
+S     61.47 6.0 NBK7_SCHOTT
+  CCY 0; THC 0
+  STO
+  CIR 12.5
+  CIR EDG 12.7
+S     -44.64 2.5&
+  673.322
+S     -129.94 95.952
+  CIR 12.5
+  PIM
+SI    0.0 0.0
+GO
+"""
+
+
+def opened(tmp_path, text, **more):
+    path = tmp_path / "lens.seq"
+    path.write_text(text)
+    return open_lens(path, **more)
+
+
+def paraxial(surfaces):
+    """Return the focal length of (curvature, thickness, index behind), from a ray parallel to the axis."""
+    h, slope, before = 1.0, 0.0, 1.0
+    for curvature, thickness, after in surfaces:
+        slope = (before * slope - (after - before) * curvature * h) / after
+        h, before = h + slope * thickness, after
+    return -1.0 / slope
+
+
+def test_radii_glasses_opening_and_field(tmp_path):
+    found = opened(tmp_path, DOUBLET)
+    lens = found.lens
+    assert lens.name == "Achromat; 100 mm"
+    assert [row.thickness for row in lens.rows] == [0.0, 6.0, 2.5, 95.952]
+    assert isinstance(lens.rows[0], Stop)
+    assert lens.rows[1].semi_diameter == 12.5
+    assert (lens.rows[2].medium.n_d, lens.rows[2].medium.v_d) == (1.673, 32.2)
+    order = first_order(lens)
+    surfaces = [(1 / 61.47, 6.0, 1.5168), (-1 / 44.64, 2.5, 1.673), (-1 / 129.94, 0.0, 1.0)]
+    assert order.efl == pytest.approx(paraxial(surfaces), rel=1e-5)
+    assert order.entrance_pupil_diameter == pytest.approx(25.0)
+    assert lens.field_deg == 5.0
+    said = " | ".join(found.remarks)
+    assert "vignetting factors" in said
+    assert "left out" not in said.replace("vignetting factors (VUX to VLY) are left out", "")
+
+
+def test_curvatures_and_radii_are_one_lens(tmp_path):
+    text = DOUBLET.replace("RDM;", "RDM N;")
+    for radius in ("61.47", "-44.64", "-129.94"):
+        text = text.replace(f"S     {radius} ", f"S     {1 / float(radius)!r} ")
+    lens = opened(tmp_path, text).lens
+    assert [row.curvature for row in lens.rows[1:]] == pytest.approx([1 / 61.47, -1 / 44.64, -1 / 129.94], rel=1e-15)
+    silent = text.replace("RDM N;", "")
+    with pytest.raises(LensError, match="no RDM, so the first number of a surface can be its radius or its curvature"):
+        opened(tmp_path, silent)
+    assert opened(tmp_path, silent, first_column="curvatures").lens.rows == lens.rows
+    # what the file states takes precedence
+    assert opened(tmp_path, text, first_column="radii").lens.rows == lens.rows
+
+
+def test_aspheres_inches_and_private_glasses(tmp_path):
+    # a Cauchy glass: n = 1.5 + 0.0042 um^2 / wavelength^2
+    lines = [404.7, 486.1327, 587.5618, 656.2725, 800.0]
+    indices = [1.5 + 4200.0 / nm**2 for nm in lines]
+    text = f"""\
+rdm y
+dim i
+fno 4
+yim 0 0.2
+prv
+  pwl {" ".join(map(str, lines))}
+  'own' {" ".join(map(repr, indices))}
+end
+so 0 1e20
+s 1.0 0.2 'own'
+  asp
+  k -0.5; a -0.015; b 0.003; j 1e-4
+s -2.0 0.1
+s 0 1.0
+sto
+si 0 0
+"""
+    found = opened(tmp_path, text)
+    row = found.lens.rows[0]
+    assert (row.thickness, row.conic) == (pytest.approx(5.08), -0.5)
+    assert row.asphere[0] == pytest.approx(-0.015 / 25.4**3)
+    assert row.asphere[1] == pytest.approx(0.003 / 25.4**5)
+    assert row.asphere[8] == pytest.approx(1e-4 / 25.4**19)
+    n_d, n_f, n_c = indices[2], indices[1], indices[3]
+    assert row.medium.n_d == pytest.approx(n_d, abs=1e-9)
+    assert row.medium.v_d == pytest.approx((n_d - 1) / (n_f - n_c), rel=1e-9)
+    efl = first_order(found.lens).efl
+    assert found.lens.field_deg == pytest.approx(math.degrees(math.atan(0.2 * 25.4 / efl)), rel=1e-9)
+    assert "lengths are in inches; converted to mm" in found.remarks
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("S     -129.94 95.952", "S     -129.94 95.952 REFL", "surface 3 is a mirror"),
+        ("  PIM\n", "  ADE 5.0\n", "surface 3: ADE tilts, shifts or shapes it"),
+        ("  PIM\n", "  DIF DOE\n", "surface 3: DIF tilts, shifts or shapes it"),
+        ("NBK7_SCHOTT", "NOSUCH_SCHOTT", "surface 1: glass 'SCHOTT NOSUCH'"),
+        ("61.47 6.0", "61.47 six", "surface 1: '61.47 six' is no radius and thickness"),
+        ("DIM   M", "DIM   F", "DIM F is unknown"),
+        ("  CIR 12.5\n  PIM", "  CIR wide\n  PIM", "surface 3: CIR is 'wide', a length was expected"),
+        ("  STO\n", "  STO S9\n", "names a surface that does not exist"),
+        ("S     -44.64 2.5&\n  673.322\nS     -129.94 95.952\n", "", "surfaces of object, lens and image"),
+    ],
+)
+def test_what_is_not_supported_is_one_sentence(tmp_path, old, new, said):
+    assert old in DOUBLET
+    with pytest.raises(LensError) as raised:
+        opened(tmp_path, DOUBLET.replace(old, new, 1))
+    assert said in " | ".join([str(raised.value), *raised.value.problems])
+
+
+def test_idle_shifts_and_unknown_commands(tmp_path):
+    found = opened(tmp_path, DOUBLET.replace("  PIM\n", "  XDE 0.0\n  QQQ 3\n"))
+    assert any("surface 3: command 'QQQ' is left out" in remark for remark in found.remarks)
+    no_stop = opened(tmp_path, DOUBLET.replace("  STO\n", ""))
+    assert any("no STO; the stop is surface 1" in remark for remark in no_stop.remarks)
+
+
+def test_the_flag_of_the_command_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.seq").write_text(DOUBLET.replace("RDM;", ""))
+    assert run(["lens", "check", "a.seq"]) == 2
+    assert "--first-column" in capsys.readouterr().err
+    assert run(["lens", "check", "a.seq", "--first-column", "radii"]) == 0
+    assert run(["lens", "convert", "a.seq", "b.toml", "--first-column", "radii"]) == 0
+    assert run(["lens", "check", "b.toml", "--first-column", "radii"]) == 2
+    assert "is no .seq file" in capsys.readouterr().err
+    assert run(["lens", "check", "a.seq", "--first-column", "x"]) == 2

@@ -1,0 +1,95 @@
+"""Ghosts over fields, wavelengths and f-numbers, and the gain of a coating at each surface."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import pytest
+
+from flarewright.cli.app import run
+from flarewright.cli.render.ghost_sweep import sweep_axes
+from flarewright.errors import FlarewrightError
+from flarewright.io.lens.coating_text import coating_choice
+from flarewright.model import Project
+from flarewright.optics.rays.ghost_table import GhostQuery
+from flarewright.render.analysis import ghosts
+from flarewright.workflow.ghost_sweep import along, surface_gains, sweep_ghosts
+
+LENS = "triplet-pestrecov"
+
+
+def swept(coating, fields=((0.0, 0.0),), wavelengths=(550.0,), f_numbers=(8.0,)):
+    project = Project.model_validate(
+        {"lens": LENS, "coating": coating_choice(coating), "lights": [{"field_deg": (0.0, 0.0)}]}
+    )
+    return tuple(sweep_ghosts(project, GhostQuery((0.0, 0.0)), fields, wavelengths, f_numbers))
+
+
+def test_each_point_is_the_analysis_of_its_combination():
+    points = swept("none", ((0.0, 0.0), (6.0, 8.0)), (450.0, 650.0), (8.0, 11.0))
+    assert [(point.f_number, point.field_deg, point.wavelength_nm) for point in points] == [
+        (f_number, field, wavelength)
+        for f_number in (8.0, 11.0)
+        for field in ((0.0, 0.0), (6.0, 8.0))
+        for wavelength in (450.0, 650.0)
+    ]
+    last = points[-1]
+    wanted = ghosts(LENS, (6.0, 8.0), f_number=11.0, wavelength_nm=650.0, coating="none")
+    assert last.table.ghosts == wanted.ghosts
+
+
+def test_a_film_without_reflection_removes_the_part_that_the_ranking_states(tmp_path):
+    """The film is a quarter of the wavelength with the index of the geometric mean, and light is near normal."""
+    bare = swept("none")
+    total = bare[0].throughput_mm2
+    gains = surface_gains(bare)
+    assert [gain.part for gain in gains] == sorted((gain.part for gain in gains), reverse=True)
+    assert sum(gain.part for gain in gains) == pytest.approx(2.0, rel=1e-12)
+    rows = max(gain.row for gain in gains) + 1
+    for gain in (gains[0], gains[-1]):
+        entries = ["quarter-wave:550:ideal" if k == gain.row else "none" for k in range(rows)]
+        path = tmp_path / f"row{gain.row}.toml"
+        path.write_text(f"rows = {json.dumps(entries)}\n")
+        left = swept(str(path))[0].throughput_mm2 / total
+        # the other ghosts pass the surface one to three times, and gain its bare reflectance, below 0.07, each time;
+        # rays that are not normal leave some reflection
+        assert 1.0 - gain.part - 1e-9 <= left <= (1.0 - gain.part) / (1.0 - 0.07) ** 3 + 1e-3
+
+
+def test_fields_lie_in_the_direction_of_the_light():
+    assert along((3.0, 4.0), (0.0, 10.0)) == ((0.0, 0.0), pytest.approx((6.0, 8.0)))
+    assert along((0.0, 0.0), (5.0,)) == ((5.0, 0.0),)
+
+
+def test_axes():
+    axes = sweep_axes(["field=0:1:0.1", "fstop=2.8, 8"])
+    assert len(axes.field) == 11
+    assert axes.field[-1] == pytest.approx(1.0)
+    assert (axes.fstop, axes.wavelength) == ((2.8, 8.0), None)
+    for text, said in (
+        ("focus=1", "is no axis"), ("field", "is no axis"), ("field=a", "is no list"), ("field=0:5", "is no list"),
+        ("field=5:0:1", "the step must be above 0"), ("field=0:80:1e-9", "more than 1000 combinations"),
+        ("field=0:95:5", "between 0 and 90"), ("wavelength=300", "is not visible"), ("fstop=0", "f-number"),
+        ("field=nan", "is no list"),
+    ):  # fmt: skip
+        with pytest.raises(FlarewrightError, match=said):
+            sweep_axes([text])
+    with pytest.raises(FlarewrightError, match="given twice"):
+        sweep_axes(["field=1", "field=2"])
+
+
+def test_the_command_prints_a_table_json_and_csv(capsys):
+    words = ["ghosts", LENS, "--light", "5,0", "--sweep", "field=0,5", "--sweep", "fstop=8,11"]
+    assert run([*words, "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert len(data["points"]) == 4
+    assert run([*words, "--csv"]) == 0
+    rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    flux = sum(float(row["throughput_mm2"]) for row in rows if row["path"] != "direct")
+    assert flux == pytest.approx(sum(point["ghosts_throughput_mm2"] for point in data["points"]), rel=1e-12)
+    assert run(words) == 0
+    assert "of ghost light" in capsys.readouterr().out
+    assert run([*words, "--brightest", "3"]) == 2
+    assert "leave it out" in capsys.readouterr().err
