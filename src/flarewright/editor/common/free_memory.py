@@ -44,7 +44,7 @@ def _library() -> tuple[Callable[[], _Mallinfo], Callable[[int], int]] | None:
 
 
 def free_bytes() -> int:
-    """Return how much memory the C library holds free, in all arenas; 0 where it cannot report that."""
+    """Return how much memory the C library has free, in all arenas, also what `release` gave back; 0 if not known."""
     library = _library()
     return 0 if library is None else int(library[0]().fordblks)
 
