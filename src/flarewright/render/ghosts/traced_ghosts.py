@@ -337,7 +337,8 @@ def _drawn_in_few(
     plane, to_pixels = canvas.plane(detail), item.to_pixels / 2.0**detail
     shown = tuple(sorted(bundle.traced))
     colors = shot.weights(shot.packed.wavelengths_nm, spectrum) * item.art.rgb
-    seen = visible_rays(shot, item.to_pixels, bundle.halves)
+    # one half: with both, the sum of a Tessar's faint ghosts is 0.8 % off in blue instead of 0.3 %
+    seen = visible_rays(shot, item.to_pixels, 1)
     weights = gathered_weights(shot.packed, bundle, shot.incidence.tilt, colors, shown, seen, careful=careful)
     watch.lap("colour")
     if weights is None:
