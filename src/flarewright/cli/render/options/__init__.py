@@ -5,7 +5,8 @@
 - `camera`: the sensor and the picture
 - `quality`: how the picture is computed
 - `art`: overrides of the artist
-- `output`: what is written, and how the PNG shows it
+- `layers`: which layers are written, and in what form
+- `output`: where the picture is written, and how the PNG shows it
 - `reference`: reference quality: errors, samples, time
 - `starburst`: dirt in the pupil and its effect on the starburst
 - `inputs`: what is rendered: a lens or a measured flare, a project, a look

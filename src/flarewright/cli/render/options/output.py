@@ -8,42 +8,22 @@ from typing import Annotated
 
 import typer
 
-PANEL = "Output"
+from .layers import PANEL, LayerOptions
 
 
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions:
-    """What is written, and how the PNG shows it. None or empty: not given."""
+class FileOption:
+    """Where the picture is written."""
 
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="OUT.exr", help="The EXR file.", rich_help_panel=PANEL)
     ]
-    layers: Annotated[
-        str | None,
-        typer.Option(
-            help="Layers: beauty; passes: also starburst, ghosts; ghosts: also each ghost.", rich_help_panel=PANEL
-        ),
-    ] = None
-    brightest: Annotated[
-        int | None,
-        typer.Option(help="Largest number of single ghosts to write, brightest first.", rich_help_panel=PANEL),
-    ] = None
-    no_starburst: Annotated[
-        bool, typer.Option("--no-starburst", help="Omit the light's direct image.", rich_help_panel=PANEL)
-    ] = False
-    colorspace: Annotated[
-        str | None, typer.Option(help="Colour space, linear: rec709 or acescg.", rich_help_panel=PANEL)
-    ] = None
-    gamut: Annotated[
-        str | None,
-        typer.Option(help="keep negative channels (default), or compress colours.", rich_help_panel=PANEL),
-    ] = None
-    half: Annotated[bool, typer.Option("--half", help="Write 16 bits per value (default).", rich_help_panel=PANEL)] = (
-        False
-    )
-    float32: Annotated[
-        bool, typer.Option("--float", help="Write 32 bits per value, unscaled irradiances.", rich_help_panel=PANEL)
-    ] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputOptions(LayerOptions, FileOption):
+    """What is written, and how the PNG shows it. None or empty: not given."""
+
     full_windows: Annotated[
         bool,
         typer.Option("--full-windows", help="Write single ghosts at full size, for Blender.", rich_help_panel=PANEL),

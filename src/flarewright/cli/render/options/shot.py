@@ -10,12 +10,12 @@ import typer
 
 from .art import ArtOptions
 from .camera import CameraOptions
+from .layers import PANEL, LayerOptions
 from .lens import LensOptions
 from .light import LightOptions
 from .quality import QualityOptions
 from .starburst import StarburstOptions
 
-PANEL = "Output"
 FRAMES = "Frames"
 WORK = "Processes"
 
@@ -60,8 +60,8 @@ class ShotInputs:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ShotOutput:
-    """What is written, and by how many processes. None or empty: not given."""
+class ShotFiles:
+    """Where the frames are written."""
 
     output: Annotated[
         str,
@@ -70,32 +70,12 @@ class ShotOutput:
             rich_help_panel=PANEL,
         ),
     ]  # fmt: skip
-    layers: Annotated[
-        str | None,
-        typer.Option(
-            help="Layers: beauty; passes: also starburst, ghosts; ghosts: also each ghost.", rich_help_panel=PANEL
-        ),
-    ] = None
-    brightest: Annotated[
-        int | None,
-        typer.Option(help="Largest number of single ghosts to write, brightest first.", rich_help_panel=PANEL),
-    ] = None
-    no_starburst: Annotated[
-        bool, typer.Option("--no-starburst", help="Omit the light's direct image.", rich_help_panel=PANEL)
-    ] = False
-    colorspace: Annotated[
-        str | None, typer.Option(help="Colour space, linear: rec709 or acescg.", rich_help_panel=PANEL)
-    ] = None
-    gamut: Annotated[
-        str | None,
-        typer.Option(help="keep negative channels (default), or compress colours.", rich_help_panel=PANEL),
-    ] = None
-    half: Annotated[bool, typer.Option("--half", help="Write 16 bits per value (default).", rich_help_panel=PANEL)] = (
-        False
-    )
-    float32: Annotated[
-        bool, typer.Option("--float", help="Write 32 bits per value, unscaled irradiances.", rich_help_panel=PANEL)
-    ] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShotOutput(LayerOptions, ShotFiles):
+    """What is written, and by how many processes. None or empty: not given."""
+
     parts: Annotated[
         str | None,
         typer.Option(

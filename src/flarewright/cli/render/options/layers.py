@@ -1,0 +1,42 @@
+"""Options of `flarewright render` and `flarewright shot`: which layers are written, and in what form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import typer
+
+PANEL = "Output"
+
+
+@dataclass(frozen=True, kw_only=True)
+class LayerOptions:
+    """Which layers are written, and in what form. None or empty: not given."""
+
+    layers: Annotated[
+        str | None,
+        typer.Option(
+            help="Layers: beauty; passes: also starburst, ghosts; ghosts: also each ghost.", rich_help_panel=PANEL
+        ),
+    ] = None
+    brightest: Annotated[
+        int | None,
+        typer.Option(help="Largest number of single ghosts to write, brightest first.", rich_help_panel=PANEL),
+    ] = None
+    no_starburst: Annotated[
+        bool, typer.Option("--no-starburst", help="Omit the light's direct image.", rich_help_panel=PANEL)
+    ] = False
+    colorspace: Annotated[
+        str | None, typer.Option(help="Colour space, linear: rec709 or acescg.", rich_help_panel=PANEL)
+    ] = None
+    gamut: Annotated[
+        str | None,
+        typer.Option(help="keep negative channels (default), or compress colours.", rich_help_panel=PANEL),
+    ] = None
+    half: Annotated[bool, typer.Option("--half", help="Write 16 bits per value (default).", rich_help_panel=PANEL)] = (
+        False
+    )
+    float32: Annotated[
+        bool, typer.Option("--float", help="Write 32 bits per value, unscaled irradiances.", rich_help_panel=PANEL)
+    ] = False
