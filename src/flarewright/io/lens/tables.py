@@ -1,7 +1,7 @@
 """Readers of plain tables of surfaces: CSV, and the lens files of pbrt (`.dat`).
 
 A CSV table has a header with `radius` (mm; `flat`, empty, 0 or inf is a plane, `stop` is the stop), `thickness`, and
-`n_d`, `v_d`, `glass`, `semi_diameter` (or `diameter`), `conic`, `A4` to `A20` as far as they are known. Lines that
+`n_d`, `v_d`, `glass`, `semi_diameter` (or `diameter`), `conic`, and `A4` to `A20` that are known. Lines that
 begin with `#` are comments; `# name = ...`, `# f_number = ...`, `# field_deg = ...` and `# focal_length = ...` state
 what the table cannot. Columns are separated by commas, semicolons or tabs; with the latter two a decimal
 comma is a point.

@@ -31,7 +31,7 @@ def configurations(found: Text, active: Configuration, stop: int | None, mm: flo
     found : Text
         Remarks are appended to it.
     active : Configuration
-        What the file states outside the table; a setting without a row of its own has the same value.
+        What the file states outside the table; a setting without a separate row has the same value.
     stop : int or None
         Number of the stop's surface.
     mm : float

@@ -114,7 +114,7 @@ class PartialPicture:
         Parameters
         ----------
         last_s : float, optional
-            When it was begun, or written last (`time.monotonic`); None: it is complete.
+            When it started, or was written last (`time.monotonic`); None: it is complete.
         """
         now = monotonic()
         with self._lock:
