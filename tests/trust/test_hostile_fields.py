@@ -18,6 +18,8 @@ ONE_IS_OUT = {
     "lens.rows.[2].kind=surface.curvature_x", "lens.rows.[2].kind=surface.medium.n_d",
     "lens.rows.[2].kind=surface.medium.v_d", "lens.positions.[1].gaps.[1].[2]",
     "lights.[1].spectrum.kind=lines.lines.[1].[2]", "design.fixed_rows.[1]", "design.bounds.n_d.[2]",
+    # three numbers are values of a curve of colours, and the curves of the file are of others
+    "curves.[1].values.[1].[3]", "lights.[1].curves.[1].values.[1].[3]",
 }  # fmt: skip
 
 

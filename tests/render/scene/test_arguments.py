@@ -116,5 +116,5 @@ def test_the_settings_are_rendered():
 def test_the_signature_names_all_settings():
     named = inspect.signature(fw.render).parameters
     assert set(Settings.__annotations__) == set(fw.Project.model_fields) - {"lens", "schema_version"}
-    assert [*named] == ["project", "threads", "progress", "run", "ledger", "profile", *Settings.__annotations__]
+    assert [*named] == ["project", "threads", "progress", "run", "ledger", "profile", "kept", *Settings.__annotations__]
     assert "coating: 'str | " in str(inspect.signature(fw.render))

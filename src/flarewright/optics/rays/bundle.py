@@ -26,7 +26,7 @@ RIM_LEVEL = 2
 # largest relative flux error from the rim
 FLUX_TOLERANCE = 3e-4
 # limits of a cell's smoothness (`kernels.tracing.grid_limits`)
-INNER_BEND, AREA_RATIO, WEIGHT_BEND, FOLD_PX, AREA_PX = 0.005, 1.0, 0.002, 2.0, 5.0
+INNER_BEND, AREA_RATIO, WEIGHT_BEND, FOLD_PX, AREA_PX = 0.005, 0.5, 0.002, 1.0, 5.0
 
 
 @dataclass(frozen=True)
