@@ -1,6 +1,7 @@
 """Every command does what its help says: one JSON object on stdout, text on stderr, complete files or none."""
 
 import csv
+import errno
 import io
 import json
 import os
@@ -10,6 +11,7 @@ import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import jsonschema
 import numpy as np
@@ -21,6 +23,8 @@ from typer.main import get_command
 import flarewright as fw
 from flarewright import __version__
 from flarewright.cli.app import app, run
+from flarewright.cli.render import command as render_command
+from flarewright.errors import OutputError
 from flarewright.io.images.exr import read_exr
 from flarewright.io.lens.library import library_names
 from flarewright.io.project.project_file import project_from_data, read_project
@@ -37,6 +41,8 @@ from flarewright.model import (
     Rectangle,
     Tabulated,
 )
+from flarewright.render.image.canvas import blank
+from flarewright.render.image.partial_picture import PartialPicture
 
 HELIAR_EFL = 99.235796
 SINGLET = """
@@ -702,3 +708,27 @@ def test_the_command_leaves_no_threads_to_the_library_of_matrices():
             [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
         )
         assert reported.stdout.strip() == wanted
+
+
+@pytest.mark.parametrize(("number", "kept"), [(errno.EACCES, True), (errno.ENOSPC, False)])
+def test_only_a_full_disk_costs_the_kept_part(number, kept, tmp_path, monkeypatch):
+    part = PartialPicture(tmp_path / "f.partial", lambda _: None)
+    part.begin("order2", 1)
+    assert part.store("ghosts-0", 1, blank((4, 4)))
+    tries = []
+
+    def write(*_):
+        tries.append(part.size_bytes)
+        if part.size_bytes:
+            raise OutputError("cannot write f.exr") from OSError(number, "no")
+        return {}, []
+
+    monkeypatch.setattr(render_command, "_write", write)
+    options = SimpleNamespace(output=tmp_path / "f.exr", full_windows=False)
+    if kept:
+        with pytest.raises(OutputError):
+            render_command._written(None, options, None, part)
+        assert part.size_bytes
+    else:
+        assert render_command._written(None, options, None, part) == ({}, [])
+        assert len(tries) == 2

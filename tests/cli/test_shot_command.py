@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from flarewright.cli.app import run
@@ -99,6 +100,18 @@ def test_bad_input_is_one_sentence(place, capsys, words, said):
     err = capsys.readouterr().err
     assert said in err
     assert len(err.strip().splitlines()) == 1
+
+
+def test_a_frame_does_not_replace_a_file_that_the_shot_reads(place, capsys):
+    from flarewright.io.images.exr import write_exr
+    from flarewright.model import Layer
+
+    write_exr("plate.1003.exr", [Layer("beauty", np.ones((36, 64, 3), np.float32), (0, 0, 64, 36), {})], (64, 36))
+    before = (place / "plate.1003.exr").read_bytes()
+    (place / "p.toml").write_text(PROJECT.replace("[quality]", '[holdout]\nimage = "plate.1003.exr"\n[quality]'))
+    assert run(["shot", "--project", "p.toml", "-o", "plate.####.exr"]) == 2
+    assert "plate.1003.exr would replace an input file" in capsys.readouterr().err
+    assert (place / "plate.1003.exr").read_bytes() == before
 
 
 def test_render_draws_a_frame_or_a_moment_and_says_which(place, capsys):

@@ -148,3 +148,26 @@ def test_values_that_do_not_fit_together_name_the_time():
     curve = ProjectCurve(of="rotation_deg", at_s=(0.0,), values=(5000.0,))
     with pytest.raises(ProjectError, match=r"at 0\.5 s"):
         project_at(moving(curves=[curve]), 0.5)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_smooth_fades_end_within_the_range_of_their_keys(seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(20):
+        times = tuple(np.cumsum(rng.uniform(0.1, 3.0, 3)))
+        values = (float(rng.uniform(0.1, 3.0)), float(rng.uniform(0.1, 3.0)), 0.0)
+        # rounding of the cubic gives -1e-16 in a fifth of such fades
+        curve = LightCurve(of="intensity", at_s=times, values=values, motion="smooth")
+        faded = project_at(
+            Project(lens="heliar-tronnier", lights=(Light(field_deg=(1.0, 1.0), curves=(curve,)),)), times[-1]
+        )
+        assert 0.0 <= faded.lights[0].intensity < 1e-12
+
+
+def test_an_iris_turns_more_than_once():
+    turning = Project(
+        lens="heliar-tronnier", lights=(Light(field_deg=(1.0, 1.0)),),
+        curves=(ProjectCurve(of="rotation_deg", at_s=(0.0, 1.0), values=(0.0, 900.0)),),
+    )  # fmt: skip
+    assert project_at(turning, 1.0).iris.rotation_deg == pytest.approx(180.0)
+    assert project_at(turning, 0.5).iris.rotation_deg == pytest.approx(90.0)

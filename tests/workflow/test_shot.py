@@ -125,6 +125,23 @@ def test_another_image_version_or_output_draws_again(change, tmp_path, monkeypat
     assert not shot(project(**given), out, frames=[1], processes=1).frames[0].drawn
 
 
+def test_an_image_that_the_lens_file_names_draws_again(tmp_path):
+    from PIL import Image
+
+    from flarewright.io.lens.library import lens_path
+
+    mask = tmp_path / "iris.png"
+    Image.new("L", (32, 32), 255).save(mask)
+    head, iris, rows = lens_path("triplet-pestrecov").read_text("utf-8").partition("[iris]\n")
+    lens = tmp_path / "own.toml"
+    lens.write_text(f'{head}{iris}mask = "{mask.as_posix()}"\n{rows[rows.index("[") :]}')
+    given, out = {"lens": str(lens), "curves": [], "iris": None}, tmp_path / "f.#.exr"
+    shot(project(**given), out, frames=[1], processes=1)
+    assert not shot(project(**given), out, frames=[1], processes=1).frames[0].drawn
+    Image.new("L", (32, 32), 128).save(mask)
+    assert shot(project(**given), out, frames=[1], processes=1).frames[0].drawn
+
+
 def test_the_header_has_the_standard_attributes_and_the_moment(whole):
     contents = read_exr(whole / "f.0004.exr")
     header = contents.header
@@ -194,7 +211,7 @@ def test_a_blurred_frame_chooses_the_brightest_ghosts_of_the_mean(tmp_path):
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"frames": "100-120"}, r"frames 100-120 lie outside the project's 1-7 .* start=100"),
+        ({"frames": "100-120"}, r"frames 100-120 lie outside the project's 1-7 .* --start 100"),
         ({"frames": []}, "is empty"),
         ({"output": "a.exr"}, "all 7 frames would go to a.exr"),
         ({"output": "f.####.png"}, r"must be named \*\.exr"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from math import fmod
 from typing import Any
 
 import numpy as np
@@ -44,7 +45,9 @@ def value_at(at_s: float, times_s: Sequence[float], values: Sequence[float], mot
         return float(np.interp(at_s, times_s, values))
     from scipy.interpolate import PchipInterpolator
 
-    return float(PchipInterpolator(times_s, values)(min(max(at_s, times_s[0]), times_s[-1])))
+    found = float(PchipInterpolator(times_s, values)(min(max(at_s, times_s[0]), times_s[-1])))
+    # rounding leaves the range by 1e-16, and an intensity below 0 is none
+    return min(max(found, min(values)), max(values))
 
 
 def light_at(light: Light, at_s: float) -> Light:
@@ -100,20 +103,21 @@ def project_at(project: Project, at_s: float) -> Project:
     """
     if is_still(project):
         return project
-    changes: dict[str, Any] = {"lights": tuple(light_at(light, at_s) for light in project.lights)}
+    changes: dict[str, Any] = {}
     for curve in project.curves:
         found = _curve_at(curve, at_s)
         match curve.of:
             case "focus_distance":
                 changes["camera"] = {**dict(project.camera), "focus_distance": found}
             case "rotation_deg":
-                changes["iris"] = {**dict(_iris(project)), "rotation_deg": found}
+                changes["iris"] = {**dict(_iris(project)), "rotation_deg": fmod(found, 360.0)}
             case "f_number" | "zoom":
                 changes[curve.of] = found
             case gain:
                 art = changes.get("art", dict(project.art))
                 changes["art"] = {**art, "gain": {**art["gain"], gain.removeprefix("gain."): found}}
     try:
+        changes["lights"] = tuple(light_at(light, at_s) for light in project.lights)
         placed: Project = project.replace(**changes)
     except ValidationError as error:
         raise ProjectError(f"at {at_s:g} s: {validation_messages(error, changes)[0]}") from None

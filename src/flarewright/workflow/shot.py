@@ -25,6 +25,8 @@ _DRAW = "flarewright.workflow.shot_frame:draw_frame"
 _MOST_REMARKS = 20
 # memory of a process: that of a tiny picture, and some 20 layers per pixel while one is drawn and written
 _PROCESS_BYTES, _PIXEL_BYTES = 300_000_000, 240
+# memory of a pixel of a single ghost's layer, and the number of ghosts of a zoom: all are written if none are chosen
+_LAYER_BYTES, _MOST_LAYERS = 24, 200
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,7 @@ def shot(
     if not mine:
         return ShotResult((), (*remarks, f"chunk {chunk} of {len(numbers)} frames is empty"), 0)
     _check_moments(plan, mine)
-    number, each = shares(len(mine), processes if processes is not None else _fitting(plan), threads)
+    number, each = shares(len(mine), processes if processes is not None else _fitting(plan, threads), threads)
     if prepare is not None:
         for frame in {mine[0], mine[len(mine) // 2], mine[-1]}:
             prepare(frame_project(plan, time_of(frame, project.timeline)), number * each)
@@ -169,8 +171,8 @@ def shot_frames(project: Project, frames: str | Sequence[int] | None) -> tuple[t
     if len(outside) == len(numbers):
         raise ProjectError(
             f"frames {frames_text(numbers)[:80]} lie outside the project's {timeline.start}-{last} (frame "
-            f"{timeline.start} is at 0 s, the last key at {long_s:g} s); give frames inside, or start={numbers[0]}, "
-            "the number of the frame at 0 s"
+            f"{timeline.start} is at 0 s, the last key at {long_s:g} s); give frames inside, or --start "
+            f"{numbers[0]}, the number of the frame at 0 s"
         )
     if not outside:
         return numbers, []
@@ -227,11 +229,17 @@ def _check_moments(plan: ShotPlan, frames: Sequence[int]) -> None:
             raise type(error)(f"at {at_s:g} s: {error}" if at_s else str(error), error.problems) from None
 
 
-def _fitting(plan: ShotPlan) -> int:
-    """Return how many processes the cores and the free memory allow."""
+def _fitting(plan: ShotPlan, threads: int | None) -> int:
+    """Return how many processes the cores, or the wanted threads, and the free memory allow."""
     from ..kernels.jit.warmup_processes import cores
     from ..render.scene.memory_check import spare_bytes
 
-    width, height = plan.project.camera.size_px
-    each = _PROCESS_BYTES + width * height * _PIXEL_BYTES
-    return max(1, int(min(cores(), spare_bytes() / each)))
+    project = plan.project
+    width, height = project.camera.size_px
+    layers = 0
+    if project.output.layers == "ghosts":
+        # a blurred frame averages all ghosts before it chooses the brightest
+        chosen = project.output.brightest if plan.shutter_deg == 0.0 else None
+        layers = _MOST_LAYERS if chosen is None else chosen
+    each = _PROCESS_BYTES + width * height * (_PIXEL_BYTES + layers * _LAYER_BYTES)
+    return max(1, int(min(threads or cores(), spare_bytes() / each)))

@@ -20,7 +20,7 @@ from ..io.project.project_file import project_text
 from ..jobs.frame_list import FramePattern
 from ..jobs.worker import WRITING
 from ..measure.replay.measured_project import is_measured, render_measured
-from ..model import Layer, Project
+from ..model import Layer, Project, Surface
 from ..render.render import Rendering
 from ..render.render import render as render_project
 from ..render.scene.resolve import open_lens, resolve_project
@@ -181,12 +181,22 @@ def _digest(plan: ShotPlan, frame: int, moments: tuple[Project, ...]) -> str:
     """Return a digest of all that determines a file: version, projects, contents of their files, kind of file."""
     timeline = plan.project.timeline
     lens = moments[0].lens
-    content = digest_of(str(lens)) if is_measured(moments[0]) else open_lens(lens).lens.model_dump_json()
+    images: set[str] = {name for project in moments for name in _files(project)}
+    heights: list[Any] = []
+    if is_measured(moments[0]):
+        content = digest_of(str(lens))
+    else:
+        opened = open_lens(lens).lens
+        content = opened.model_dump_json()
+        # a lens file can name images too; those of figure errors are read with it
+        images |= {opened.iris.mask} if opened.iris is not None and opened.iris.mask is not None else set()
+        heights = [row.figure.heights for row in opened.rows if isinstance(row, Surface) and row.figure is not None]
     made_of = {
         "version": __version__,
         "moments": [project.model_dump(mode="json", exclude={"lens"}) for project in moments],
         "lens": content,
-        "files": {name: digest_of(name) for project in moments for name in _files(project)},
+        "files": {name: digest_of(name) for name in images},
+        "heights": sha256(repr(heights).encode()).hexdigest() if heights else "",
         "frame": [frame, str(frame_rate(timeline.fps)), plan.open_s],
         "file": [plan.scale, plan.parts, plan.cropped],
     }

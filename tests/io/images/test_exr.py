@@ -238,3 +238,15 @@ def test_what_cannot_be_written_or_read_is_one_sentence(tmp_path, layers):
     with pytest.raises(OutputError, match="cannot be read as an EXR"):
         read_exr(tmp_path / "junk.exr")
     assert [file.name for file in tmp_path.iterdir()] == ["junk.exr"]
+
+
+def test_other_channels_of_a_picture_by_others_are_left_out(tmp_path):
+    import OpenEXR
+
+    rng = np.random.default_rng(1)
+    channels = {name: rng.random((4, 6), dtype=np.float32) for name in ("R", "G", "B", "depth.Z")}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    # the library replaces the arrays of a given dictionary
+    OpenEXR.File(header, dict(channels)).write(str(tmp_path / "photo.exr"))
+    [picture] = read_exr(tmp_path / "photo.exr").layers
+    np.testing.assert_array_equal(picture.pixels[..., 1], channels["G"])

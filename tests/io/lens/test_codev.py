@@ -132,6 +132,9 @@ si 0 0
         ("DIM   M", "DIM   F", "DIM F is unknown"),
         ("  CIR 12.5\n  PIM", "  CIR wide\n  PIM", "surface 3: CIR is 'wide', a length was expected"),
         ("  STO\n", "  STO S9\n", "names a surface that does not exist"),
+        ("  CIR EDG 12.7\n", "  CIR S9 12.7\n", "names a surface that does not exist"),
+        ("  PIM\n", "  THI S1 7.0\n", "surface 1: THI changes it; give radius, thickness and glass in its line S"),
+        ("  PIM\n", "  RMD REFL\n", "surface 3: RMD changes it"),
         ("S     -44.64 2.5&\n  673.322\nS     -129.94 95.952\n", "", "surfaces of object, lens and image"),
     ],
 )
@@ -140,6 +143,14 @@ def test_what_is_not_supported_is_one_sentence(tmp_path, old, new, said):
     with pytest.raises(LensError) as raised:
         opened(tmp_path, DOUBLET.replace(old, new, 1))
     assert said in " | ".join([str(raised.value), *raised.value.problems])
+
+
+def test_a_command_can_name_its_surface(tmp_path):
+    lens = opened(tmp_path, DOUBLET.replace("  PIM\n", "  CIR S2 11.0\n", 1)).lens
+    plain = opened(tmp_path, DOUBLET).lens
+    rims = [[row.semi_diameter for row in each.rows if not isinstance(row, Stop)] for each in (lens, plain)]
+    assert rims[0][1] == 11.0
+    assert rims[0][2] == rims[1][2] == 12.5
 
 
 def test_idle_shifts_and_unknown_commands(tmp_path):

@@ -62,6 +62,8 @@ def test_it_is_a_lens_in_every_command_and_no_measured_flare(tmp_path, monkeypat
     ("change", "said"),
     [
         ({"aperture_index": 9}, "aperture_index is 9, the place of the stop"),
+        ({"aperture_index": None}, "aperture_index is missing, the place of the stop"),
+        ({"lens_elements": [{"radius": 50.0}]}, "element 0: distance is missing, a number was expected"),
         ({"lens_elements": [], "aperture_index": 0}, "the table has no rows"),
         ({"lens_elements": {}}, "has no list lens_elements"),
         ({"lens_elements": [3]}, "element 0 is 3, an object"),

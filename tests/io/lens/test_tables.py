@@ -68,6 +68,18 @@ def test_without_an_f_number_the_stop_gives_it(tmp_path):
     assert first_order(lens).stop_semi_diameter == pytest.approx(5.0)
 
 
+def test_a_surface_of_glass_can_be_the_stop(tmp_path):
+    text = (
+        TABLE.replace("5,stop,3.0,,,,5,,\n", "")
+        .replace("conic,A4", "conic,A4,stop")
+        .replace(",,8,-0.5,1e-6", ",,8,-0.5,1e-6,yes")
+    )
+    lens = opened(tmp_path, text).lens
+    glasses = [row.medium.n_d for row in lens.rows if not isinstance(row, Stop) and row.medium is not None]
+    assert glasses == [1.6, pytest.approx(1.6727, abs=1e-4), 1.6]
+    assert sum(isinstance(row, Stop) for row in lens.rows) == 1
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
@@ -84,6 +96,7 @@ def test_without_an_f_number_the_stop_gives_it(tmp_path):
         ("25.0,4.0", "25.0,-4.0", "line 5: glass cannot be -4 mm thick"),
         ("25.0,4.0", "25.0,1e9", "line 5: "),
         ("conic,A4", "conic,conic", "are the same; keep one"),
+        ("2,flat,5.0", "2,flat,", "line 6: its thickness is missing"),
     ],
 )
 def test_faults_of_a_table_name_the_line(tmp_path, old, new, said):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -285,8 +286,9 @@ def _written(
         return write()
     try:
         done = write()
-    except OutputError:
-        if not kept.size_bytes:
+    except OutputError as error:
+        cause = error.__cause__
+        if not (kept.size_bytes and isinstance(cause, OSError) and cause.errno in (errno.ENOSPC, errno.EDQUOT)):
             raise
         kept.remove()
         return write()

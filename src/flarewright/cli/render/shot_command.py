@@ -42,7 +42,7 @@ def shot(options: ShotOptions) -> None:
 
     parts = _parts(options.parts)
     project, remarks = _project(options)
-    keep_inputs(project, options.project, _existing(FramePattern(options.output)))
+    keep_inputs(project, options.project, _files(FramePattern(options.output), project, options.frames))
     started = time.monotonic()
     with _progress() as report:
         result = draw(
@@ -110,9 +110,11 @@ def _project(options: ShotOptions) -> tuple[Project, list[str]]:
     return project_of({**dict(project), "timeline": timeline}), remarks
 
 
-def _existing(pattern: FramePattern) -> list[Path]:
-    """Return the plain file that the frames would replace, if it has no place for a number."""
-    return [] if pattern.numbered else [Path(pattern.text)]
+def _files(pattern: FramePattern, project: Project, frames: str | None) -> list[Path]:
+    """Return the files of all frames."""
+    from ...workflow.shot import shot_frames
+
+    return [pattern.path(frame) for frame in shot_frames(project, frames)[0]]
 
 
 def _compile(project: Project, threads: int) -> None:

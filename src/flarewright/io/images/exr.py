@@ -259,7 +259,8 @@ def _contents(file: Any) -> ExrContents:
         if len(file.parts) == 1:
             # a file that `one_part` wrote
             below = dict.fromkeys(name.rpartition(".")[0] for name in part.channels if "." in name)
-            groups += [(f"{name}.", name) for name in below]
+            # files of others hold more, such as depth.Z
+            groups += [(f"{n}.", n) for n in below if all(f"{n}.{channel}" in part.channels for channel in _CHANNELS)]
         x, y = (int(value) for value in part.header["dataWindow"][0])
         about = _prefixed(part.header, f"{_PREFIX}layer.")
         for prefix, name in groups:

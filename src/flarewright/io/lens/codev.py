@@ -52,6 +52,7 @@ _UNSUPPORTED = frozenset({
     "ADE", "BDE", "CDE", "XDE", "YDE", "ZDE", "ALP", "BET", "GAM", "INC", "SPS", "CYL", "XTO", "YTO", "AAS", "GRT",
     "DIF", "FRE", "HOE", "GRX", "ARR", "UDS", "ZRN", "SPL", "BEN", "DAR", "REV", "RET", "GLB", "NSS", "CUX", "RDX",
 })  # fmt: skip
+_IN_ITS_LINE = frozenset({"RDY", "CUY", "THI", "GLA", "RMD"})
 _SHIFTS = frozenset({"ADE", "BDE", "CDE", "XDE", "YDE", "ZDE", "ALP", "BET", "GAM", "CUX", "RDX"})
 _NOT_ROUND = ("REX", "REY", "ELX", "ELY", "ADX", "ADY", "ARO", "POX", "POY")
 _WORDS = re.compile(r"'[^']*'|\"[^\"]*\"|[^\s;]+")
@@ -166,10 +167,10 @@ def _private(key: str, words: list[str], reading: _Reading) -> None:
 
 
 def _of_surface(key: str, words: list[str], reading: _Reading) -> None:
-    """Apply a command to the last surface; STO can name another one."""
+    """Apply a command to the last surface, or to the one that it names."""
     surface = reading.surfaces[-1] if reading.surfaces else None
-    if key == "STO" and words and (named := re.fullmatch(r"[Ss](\d+)", words[0])):
-        number = int(named[1])
+    if words and (named := re.fullmatch(r"[Ss](\d+)", words[0])):
+        number, words = int(named[1]), words[1:]
         surface = reading.surfaces[number] if number < len(reading.surfaces) else None
     if surface is None:
         reading.problems.append(f"{shorten(' '.join([key, *words]))} names a surface that does not exist")
@@ -189,6 +190,8 @@ def _of_surface(key: str, words: list[str], reading: _Reading) -> None:
             surface.terms[_TERMS[key]] = value
     elif key == "CIR":
         _rim(surface, words, reading)
+    elif key in _IN_ITS_LINE:
+        reading.problems.append(f"{where}: {key} changes it; give radius, thickness and glass in its line S instead")
     elif key in _UNSUPPORTED:
         if key not in _SHIFTS or any(number_of(word) for word in words):
             reading.problems.append(f"{where}: {key} tilts, shifts or shapes it in a way that is not supported")

@@ -21,7 +21,8 @@ from ..files.sentences import shorten
 from ..files.text_file import read_json
 from .table_rows import TableHead, TableRow, sequence_of
 
-_KEYS = {"radius": 0.0, "distance": 0.0, "refractive_index": 1.0, "abbe_nr": 0.0, "height": 0.0}
+# None: each element has it
+_KEYS = {"radius": None, "distance": None, "refractive_index": 1.0, "abbe_nr": 0.0, "height": 0.0}
 _TOP = ("name", "year", "patent_number", "notes", "focal_length", "fstop", "aperture_index", "lens_elements")
 
 
@@ -53,9 +54,10 @@ def read_realflare(path: str | Path) -> RawSequence:
     unknown = [key for key in data if key not in _TOP]
     if unknown:
         head.remarks.append(f"keys left out: {', '.join(shorten(key) for key in unknown[:8])}")
-    stop = data.get("aperture_index", 0)
+    stop = data.get("aperture_index")
     if isinstance(stop, bool) or not isinstance(stop, int) or not 0 <= stop < max(len(elements), 1):
-        head.problems.append(f"aperture_index is {shorten(stop)}, the place of the stop in lens_elements was expected")
+        found = "missing" if stop is None else shorten(stop)
+        head.problems.append(f"aperture_index is {found}, the place of the stop in lens_elements was expected")
     rows = [row for k, entry in enumerate(elements) if (row := _row(k, entry, k == stop, head)) is not None]
     return sequence_of(str(path), head, rows)
 
@@ -71,7 +73,8 @@ def _row(k: int, entry: Any, stop: bool, head: TableHead) -> TableRow | None:
     for key, default in _KEYS.items():
         value = _number(entry.get(key, default))
         if value is None:
-            head.problems.append(f"element {k}: {key} is {shorten(entry[key])}, a number was expected")
+            found = shorten(entry[key]) if key in entry else "missing"
+            head.problems.append(f"element {k}: {key} is {found}, a number was expected")
             return None
         values[key] = value
     index, abbe = values["refractive_index"], values["abbe_nr"]

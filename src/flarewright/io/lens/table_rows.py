@@ -129,9 +129,9 @@ def _row(row: TableRow, head: TableHead, findings: list[tuple[int, media.Finding
     elif 0.0 < abs(row.radius) < _TIGHTEST:
         problems.append(f"{where}: the radius is {row.radius:g}: less than a micrometre is no lens surface")
     medium = None
-    if not row.stop and (row.glass is not None or row.n_d is not None):
+    if row.glass is not None or row.n_d is not None:
         medium = numbered_medium(row.glass, row.n_d, row.v_d, where, problems, findings, row.number)
-    elif row.v_d and not row.stop:
+    elif row.v_d:
         problems.append(f"{where}: an Abbe number alone is no glass: add n_d or the glass's name")
     if medium is not None and row.thickness < 0.0:
         problems.append(f"{where}: glass cannot be {row.thickness:g} mm thick")

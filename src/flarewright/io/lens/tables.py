@@ -79,6 +79,8 @@ def read_csv_table(path: str | Path) -> RawSequence:
     if not head.problems:
         for number, cells in table[1:]:
             given = {key: cells[k] for key, k in columns.items() if k < len(cells)}
+            if not given.get("thickness") and number != table[-1][0]:
+                head.problems.append(f"line {number}: its thickness is missing")
             rows += _csv_row(number, given, delimiter != ",", head)
     return sequence_of(str(path), head, rows)
 

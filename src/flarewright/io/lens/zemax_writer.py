@@ -18,6 +18,8 @@ from . import glass_catalogue
 _WAVELENGTHS_UM = (0.4861327, 0.5875618, 0.6562725)
 _SAME_INDEX = 1e-6
 _SAME_ABBE = 0.01
+# aspheric terms from r^4 on: Zemax's even asphere has eight, from r^2 to r^16
+_MOST_TERMS = 7
 
 
 class LensState(NamedTuple):
@@ -125,6 +127,8 @@ def _surface(
         ]  # fmt: skip
     if row.toroidal and any(row.asphere):
         raise LensError(f"row {k} has different curvatures in its meridians and aspheric terms, which .zmx cannot hold")
+    if len(row.asphere) > _MOST_TERMS:
+        raise LensError(f"row {k} has aspheric terms above r^16, which .zmx cannot hold; write a .toml or .json file")
     kind = "BICONICX" if row.toroidal else "EVENASPH" if any(row.asphere) else "STANDARD"
     lines += [f"  TYPE {kind}", f'  CURV {row.curvature!r} 0 0 0 0 ""', f"  CONI {row.conic!r}"]
     if row.toroidal:
