@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from flarewright import Light, LightCurve, LightKey, Project, ProjectCurve, Timeline
 from flarewright.errors import ProjectError
 from flarewright.io.project.project_file import project_from_data, project_text
+from flarewright.model.lens.prescription import LEAST_F_NUMBER
 from flarewright.workflow.keyframes import (
     frame_rate,
     is_still,
@@ -145,7 +146,8 @@ def test_a_value_has_one_curve():
 
 
 def test_values_that_do_not_fit_together_name_the_time():
-    curve = ProjectCurve(of="rotation_deg", at_s=(0.0,), values=(5000.0,))
+    # the least f-number itself is none
+    curve = ProjectCurve(of="f_number", at_s=(0.0,), values=(LEAST_F_NUMBER,))
     with pytest.raises(ProjectError, match=r"at 0\.5 s"):
         project_at(moving(curves=[curve]), 0.5)
 
