@@ -206,7 +206,7 @@ HIDDEN = {
     "short draft": ("canon-70-200", BROADBAND, (6.0, 3.0), 5.6, "19-12", "draft"),
     "draft hidden up to the red end": ("nikkor-85-f1.4", BROADBAND, (7.0, -3.0), 2.8, "18-14", "draft"),
 }
-WINDOWS_NM = {"hidden draft": (360.0, 410.0), "short draft": (434.0, 459.0)}
+WINDOWS_NM = {"hidden draft": (360.0, 410.0), "short draft": (360.0, 410.0)}
 
 
 @pytest.mark.parametrize(
