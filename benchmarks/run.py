@@ -30,7 +30,7 @@ import numpy as np
 from benchmarks.design import design
 from benchmarks.lights import area, lights, surfaces
 from benchmarks.passes import passes
-from benchmarks.scaling import scaling
+from benchmarks.scaling import peak_mb, scaling
 from benchmarks.small import RATIOS, lost, small
 from benchmarks.suite import SIZES, suite
 from benchmarks.yardstick import RAY_SURFACES, trace_plainly
@@ -399,7 +399,7 @@ def _has_main() -> bool:
 
 
 MEMORY = """
-import resource, sys
+import sys
 sys.path.insert(0, {root!r})
 from benchmarks.run import canon_frame, heliar_frame
 from flarewright.model import Camera, Iris
@@ -409,7 +409,6 @@ if {which!r} == "canon":
 else:
     project = heliar_frame("final", starburst=True).replace(camera=Camera(size_px=(1920, 1080)))
 render(project)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
 
@@ -419,10 +418,7 @@ def memory() -> Rows:
     root = str(Path(__file__).parents[1])
     for which in ("canon", "heliar"):
         code = MEMORY.format(root=root, which=which)
-        done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-        # kilobytes on Linux, bytes on macOS
-        scale = 1e6 if sys.platform == "darwin" else 1e3
-        found.append(row("memory", f"peak, {which} final 1920x1080", int(done.stdout.split()[-1]) / scale, "MB"))
+        found.append(row("memory", f"peak, {which} final 1920x1080", peak_mb(code), "MB"))
     return found
 
 

@@ -78,17 +78,21 @@ def _timed(work: Callable[[], Any], at: float) -> Point:
     return Point(at, statistics.median(wall), statistics.median(cpu))
 
 
-def _peak_mb(size: tuple[int, int]) -> float:
-    """Return the peak memory of a process that draws one frame with everything as photographed, MB."""
-    code = (
-        "import resource, sys; from benchmarks.scaling import frame; from flarewright.render.render import render\n"
-        "from flarewright.render.scene.photographic_defaults import as_photographed\n"
-        f"render(as_photographed(frame(size={size}, wavelengths=7), frozenset({{'f_number'}}))[0])\n"
-        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
-    )
+def peak_mb(code: str) -> float:
+    """Return the peak resident memory of a process that runs some Python code, MB."""
+    code += "\nimport resource; print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     # kilobytes on Linux, bytes on macOS
     return int(done.stdout.split()[-1]) / (1e6 if sys.platform == "darwin" else 1e3)
+
+
+def _photographed(size: tuple[int, int]) -> str:
+    """Return code that draws one frame with all defaults."""
+    return (
+        "from benchmarks.scaling import frame; from flarewright.render.render import render\n"
+        "from flarewright.render.scene.photographic_defaults import as_photographed\n"
+        f"render(as_photographed(frame(size={size}, wavelengths=7), frozenset({{'f_number'}}))[0])"
+    )
 
 
 def scaling(row: Row, threads: int) -> list[dict[str, Any]]:
@@ -120,5 +124,5 @@ def scaling(row: Row, threads: int) -> list[dict[str, Any]]:
         if len(points) > 1:
             found.append(row("scaling", f"exponent of {name}", exponent(points, wall=name == "threads"), ""))
     for size in LARGE:
-        found.append(row("scaling", f"peak memory, {size[0]}x{size[1]}, defaults", _peak_mb(size), "MB"))
+        found.append(row("scaling", f"peak memory, {size[0]}x{size[1]}, defaults", peak_mb(_photographed(size)), "MB"))
     return found

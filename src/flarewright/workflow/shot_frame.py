@@ -16,11 +16,12 @@ from ..io.files.text_file import digest_of
 from ..io.images.exr import read_exr, write_exr
 from ..io.images.exr_attributes import shot_attributes
 from ..io.images.half import half_scale
+from ..io.project.named_files import picture_files
 from ..io.project.project_file import project_text
 from ..jobs.frame_list import FramePattern
 from ..jobs.worker import WRITING
 from ..measure.replay.measured_project import is_measured, render_measured
-from ..model import Layer, Project, Surface
+from ..model import Layer, Project
 from ..render.render import Rendering
 from ..render.render import render as render_project
 from ..render.scene.resolve import open_lens, resolve_project
@@ -181,34 +182,22 @@ def _digest(plan: ShotPlan, frame: int, moments: tuple[Project, ...]) -> str:
     """Return a digest of all that determines a file: version, projects, contents of their files, kind of file."""
     timeline = plan.project.timeline
     lens = moments[0].lens
-    images: set[str] = {name for project in moments for name in _files(project)}
-    heights: list[Any] = []
+    images = {name for project in moments for name in picture_files(project)}
     if is_measured(moments[0]):
         content = digest_of(str(lens))
     else:
         opened = open_lens(lens).lens
         content = opened.model_dump_json()
-        # a lens file can name images too; those of figure errors are read with it
-        images |= {opened.iris.mask} if opened.iris is not None and opened.iris.mask is not None else set()
-        heights = [row.figure.heights for row in opened.rows if isinstance(row, Surface) and row.figure is not None]
+        images.update(picture_files(opened))
     made_of = {
         "version": __version__,
         "moments": [project.model_dump(mode="json", exclude={"lens"}) for project in moments],
         "lens": content,
         "files": {name: digest_of(name) for name in images},
-        "heights": sha256(repr(heights).encode()).hexdigest() if heights else "",
         "frame": [frame, str(frame_rate(timeline.fps)), plan.open_s],
         "file": [plan.scale, plan.parts, plan.cropped],
     }
     return sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()
-
-
-def _files(project: Project) -> Iterator[str]:
-    """Yield the names of the images that a project reads."""
-    holdouts = [project.holdout, *(light.holdout for light in project.lights)]
-    images = [project.iris.mask if project.iris else None, project.dirt.image]
-    images += [image for hiding in holdouts if hiding for image in (hiding.image, hiding.depth)]
-    yield from (image for image in images if image is not None)
 
 
 def _made_by(path: Path) -> str | None:

@@ -12,11 +12,12 @@ from flarewright.editor.preview.display_image import png
 from flarewright.editor.server.uploads import take_in
 from flarewright.editor.session.files import project_for_lens
 from flarewright.editor.session.history import committed, started
-from flarewright.editor.session.reach import FIELDS, Reach, files_of, reach_of
+from flarewright.editor.session.reach import Reach, files_of, reach_of
 from flarewright.editor.session.session import begin
 from flarewright.errors import FlarewrightError, ProjectError
 from flarewright.io.files.state_folder import state_folder
 from flarewright.io.lens.library import lens_path
+from flarewright.io.project.named_files import FIELDS
 from flarewright.io.project.project_file import project_text
 from flarewright.model import Holdout, Project
 

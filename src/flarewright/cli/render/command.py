@@ -176,14 +176,13 @@ def _without_effect(options: RenderOptions, settings: Project) -> list[str]:
 
 def keep_inputs(settings: Project, project_file: Path | None, outputs: list[Path]) -> None:
     """Raise an error if an output would replace an input file."""
-    read = [project_file, settings.lens if isinstance(settings.lens, str) else None]
-    read += [settings.iris.mask if settings.iris is not None else None, settings.dirt.image]
-    for hiding in (settings.holdout, *(light.holdout for light in settings.lights)):
-        read += [] if hiding is None else [hiding.image, hiding.depth]
-    for source in read:
-        for output in outputs:
-            if source is not None and Path(source).exists() and output.exists() and output.samefile(source):
-                raise ProjectError(f"{output} would replace an input file; choose another name for -o")
+    from ...io.project.named_files import picture_files
+
+    read = [project_file, settings.lens if isinstance(settings.lens, str) else None, *picture_files(settings)]
+    sources = [source for source in read if source is not None and Path(source).exists()]
+    for output in outputs:
+        if output.exists() and any(output.samefile(source) for source in sources):
+            raise ProjectError(f"{output} would replace an input file; choose another name for -o")
 
 
 def _read_state(path: Path | None) -> ReferenceState | None:

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from ...errors import FlarewrightError, ProjectError
 from ...io.lens.library import lens_path, library_names, near_names
+from ...io.project.named_files import picture_files
 from ...measure.replay.measured_project import is_measured
 from ...model import Project
 from ...render.scene.resolve import open_lens
 from .history import History
-
-# fields of the model that name files of pictures (tests/editor/session/test_reach.py)
-FIELDS = ("image", "depth", "mask")
 
 
 @dataclass(frozen=True)
@@ -112,20 +109,7 @@ def reach_of(roots: Iterable[Path], history: History) -> Reach:
 def files_of(project: Project) -> tuple[str, ...]:
     """Return the paths of all files that a project reads: its lens or measured flare, and pictures."""
     lens = (project.lens,) if isinstance(project.lens, str) and not _shipped(project.lens) else ()
-    return (*lens, *_named(project.model_dump(exclude={"design", "art"})))
-
-
-def _named(data: Any) -> Iterator[str]:
-    """Yield the values of all fields of a dump that name files."""
-    if isinstance(data, Mapping):
-        for key, value in data.items():
-            if key in FIELDS and isinstance(value, str):
-                yield value
-            else:
-                yield from _named(value)
-    elif isinstance(data, list | tuple):
-        for each in data:
-            yield from _named(each)
+    return (*lens, *picture_files(project))
 
 
 def _shipped(text: str) -> bool:

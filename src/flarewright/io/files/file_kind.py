@@ -19,7 +19,7 @@ WRITTEN_LENS_SUFFIXES = (".toml", ".zmx", ".lens", ".csv", ".json")
 Kind = Literal["lens", "look", "project", "scene"]
 
 REALFLARE_KEY, OPTILAND_KEY = "lens_elements", "surface_group"
-# the key that tells them apart stands within so many bytes
+# the key that distinguishes them lies within this number of bytes
 _START = 65536
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 

@@ -125,11 +125,11 @@ def _commands(text: str) -> list[list[str]]:
     for line in text.splitlines():
         # an exclamation mark inside quotes is text
         content = re.sub(r"('[^']*'|\"[^\"]*\")|!.*", lambda found: found[1] or "", line).rstrip()
-        begun = content.removesuffix("&")
+        part = content.removesuffix("&")
         if continued:
-            lines[-1] += " " + begun.strip()
+            lines[-1] += " " + part.strip()
         else:
-            lines.append(begun.strip())
+            lines.append(part.strip())
         continued = content.endswith("&")
     parts = [part for line in lines for part in re.findall(r"(?:'[^']*'|\"[^\"]*\"|[^;'\"]|['\"])+", line)]
     return [words for part in parts if (words := _WORDS.findall(part))]

@@ -14,7 +14,6 @@ Rendering", section 6.4, and its lens files.
 from __future__ import annotations
 
 import csv
-import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -27,7 +26,7 @@ from ..files.door import sentences_for
 from ..files.sentences import did_you_mean, shorten
 from ..files.text_file import read_bytes
 from .table_rows import TableHead, TableRow, sequence_of
-from .zemax_text import decoded
+from .zemax_text import decoded, number_of
 
 _ALIASES = {
     "radius": ("radius", "r", "roc", "radiusmm"), "curvature": ("curvature", "c", "cv"),
@@ -110,7 +109,7 @@ def read_dat(path: str | Path) -> RawSequence:
         if not words:
             head.name = head.name or comment.strip()[:80]
             continue
-        values = [_finite(word) for word in words]
+        values = [number_of(word) for word in words]
         if len(values) != 4 or None in values:
             head.problems.append(
                 f"line {number}: {shorten(content.strip())} is no row of four numbers (radius, thickness, index, "
@@ -142,7 +141,7 @@ def _state(key: str, value: str, head: TableHead) -> None:
     if key in ("name", "notes"):
         setattr(head, key, value)
         return
-    number = _finite(value)
+    number = number_of(value)
     if number is None or number <= 0.0:
         head.problems.append(f"{key} is {shorten(value)}, a number above 0 was expected")
     else:
@@ -176,7 +175,7 @@ def _csv_row(number: int, given: dict[str, str], comma: bool, head: TableHead) -
             continue
         if key in ("radius", "curvature") and (text.lower() in _FLAT_WORDS or text.lower() == "stop"):
             continue
-        value = _finite(text.replace(",", ".") if comma else text)
+        value = number_of(text.replace(",", ".") if comma else text)
         if value is None:
             head.problems.append(f"line {number}: {key} is {shorten(text)}, a number was expected")
             return []
@@ -202,14 +201,6 @@ def _csv_row(number: int, given: dict[str, str], comma: bool, head: TableHead) -
             asphere=tuple(terms),
         )
     ]
-
-
-def _finite(text: str) -> float | None:
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
 
 
 __all__ = ["read_csv_table", "read_dat"]

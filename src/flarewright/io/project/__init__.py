@@ -1,6 +1,7 @@
 """Project, scene and look files, and the text forms of spectra.
 
 - `look_file`: `read_look`, `look_text`, `shipped_looks`
+- `named_files`: `picture_files`, the pictures that a project or a lens names
 - `project_file`: `read_project`, `project_from_data`, `project_json_schema`
 - `project_text`: `project_text`, projects as TOML
 - `scene_file`: `read_scene`, `scene_from_data`, `scene_json_schema`
