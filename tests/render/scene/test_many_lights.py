@@ -339,7 +339,7 @@ def test_a_dark_wavelength_leaves_its_light_to_bright_ones(one_color):
     gathered = gathered_weights(*everything, careful=False)
     assert tuple(gathered) == ((int(flux.argmax()),) if one_color else tuple(w for w in shown if w != middle))
     light = sum(flux[w] * rgb for w, rgb in gathered.items())
-    # forty-eight rays determine how much a wavelength passes
+    # a hundred rays determine how much a wavelength passes
     whole = flux @ weights
     np.testing.assert_allclose(light, whole, atol=0.03 * np.abs(whole).max())
     # mirrors without reflectance have no colour, and no weight is NaN

@@ -59,7 +59,7 @@ def passes(rays: np.ndarray) -> np.ndarray:
 
 def test_rays_are_chosen_by_area():
     bundle = grid(12)
-    chosen = spread_rays(bundle, (0,), (passes,), 40)
+    chosen, _ = spread_rays(bundle, (0,), (passes,), 40)
     assert len(chosen) == 40
     # half of the area holds 576 of 580 nodes
     assert 0.4 <= (bundle.pupil[chosen, 0] > 1.0).mean() <= 0.6
@@ -68,10 +68,10 @@ def test_rays_are_chosen_by_area():
 def test_only_rays_that_pass_are_chosen():
     bundle = grid(12)
     bundle.traced[0][bundle.pupil[:, 1] > 0.5, ALIVE] = 0.0
-    chosen = spread_rays(bundle, (0,), (passes,), 40)
+    chosen, _ = spread_rays(bundle, (0,), (passes,), 40)
     assert (bundle.pupil[chosen, 1] <= 0.5).all()
     bundle.traced[0][:, ALIVE] = 0.0
-    assert spread_rays(bundle, (0,), (passes,), 40).size == 0
+    assert spread_rays(bundle, (0,), (passes,), 40)[0].size == 0
 
 
 def test_rays_whose_mirror_image_passes_count_as_well():
@@ -83,8 +83,23 @@ def test_rays_whose_mirror_image_passes_count_as_well():
     def mirrored(rays: np.ndarray) -> np.ndarray:
         return passes(rays) & ~left
 
-    chosen = spread_rays(bundle, (0,), (passes, mirrored), 60)
+    chosen, halves = spread_rays(bundle, (0,), (passes, mirrored), 60)
     assert left[chosen].sum() == pytest.approx(20, abs=2)
+    assert not left[chosen[halves == 1]].any()
+    assert (halves == 1).sum() == pytest.approx(20, abs=2)
+
+
+def test_a_ray_that_passes_at_one_of_the_wavelengths_can_be_chosen():
+    """Only rays that pass at all of them would leave out the rim, and with it the difference of the wavelengths."""
+    bundle = grid(12)
+    other = bundle.traced[0].copy()
+    bundle.traced[0][bundle.pupil[:, 1] > 0.5, ALIVE] = 0.0
+    other[bundle.pupil[:, 1] < 0.25, ALIVE] = 0.0
+    both = Bundle(bundle.path, bundle.pupil, bundle.triangles, {0: bundle.traced[0], 1: other}, 1)
+    chosen, _ = spread_rays(both, (0, 1), (passes,), 400)
+    y = bundle.pupil[chosen, 1]
+    assert (y > 0.5).any()
+    assert (y < 0.25).any()
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.3, 2.0])
@@ -108,7 +123,7 @@ def test_a_bundle_without_a_triangle_has_no_rays():
     bundle = grid(2)
     empty = Bundle(bundle.path, bundle.pupil, bundle.triangles[:0], bundle.traced, 1)
     _, shot = shot_of("tessar-brendel", (8.0, 5.0))
-    assert spread_rays(empty, (0,), visible_rays(shot, shot.to_pixels, 1), 12).size == 0
+    assert spread_rays(empty, (0,), visible_rays(shot, shot.to_pixels, 1), 12)[0].size == 0
     assert traced_spectrum(shot, bundle.path, empty, shot.to_pixels) is None
 
 

@@ -38,6 +38,8 @@ class FinalPass:
     least_steps : int
         Least number of drawings from one traced wavelength to the next. A sliver needs two: its throughput is curved
         even there, and interpolated rays show it.
+    pictured : ndarray, shape (4,), or None
+        Place in the picture of the shot, as `to_pixels`, of a ghost that is drawn on a sheet of another size.
     """
 
     shot: Shot
@@ -51,6 +53,12 @@ class FinalPass:
     detail: int = 0
     orders: tuple[GratingOrder, ...] = ()
     least_steps: int = 1
+    pictured: Floats | None = None
+
+    @property
+    def in_picture(self) -> Floats:
+        """Place of the ghost in the picture of the shot: which rays are seen there decides its colour."""
+        return self.to_pixels if self.pictured is None else self.pictured
 
     @property
     def alone(self) -> tuple[object, ...]:

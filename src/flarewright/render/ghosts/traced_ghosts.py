@@ -226,8 +226,8 @@ def draw_final(
         replace(fine, one_color=few and one_color, rough=detail + rough, coarse=quality.screen),
     )  # fmt: skip
     watch.built(bundle, detail)
-    spectrum = traced_spectrum(shot, path, bundle, item.to_pixels)
-    steep = "not" if few else steepness(shot, bundle, spectrum, item.to_pixels)
+    spectrum = traced_spectrum(shot, path, bundle, item.in_picture)
+    steep = "not" if few else steepness(shot, bundle, spectrum, item.in_picture)
     if steep != "not":
         other = _seen_by(at_fine_wavelengths(shot), item)
         if steep == "much":
@@ -236,7 +236,7 @@ def draw_final(
             return
         # as fine as the drawn grid: with errors four times as large, two of 468 ghosts miss the 2 % limit
         grid = trace_grid(other.shot.packed, path, tilt, (opening.radius, opening.inner), other.region, fine)
-        spectrum = bent_spectrum(shot, other.shot, grid, spectrum, item.to_pixels)
+        spectrum = bent_spectrum(shot, other.shot, grid, spectrum, item.in_picture)
     watch.lap("colour")
     if few and _drawn_in_few(item, bundle, spectrum, canvas, detail, watch, careful=not quality.screen):
         return
@@ -338,7 +338,7 @@ def _drawn_in_few(
     shown = tuple(sorted(bundle.traced))
     colors = shot.weights(shot.packed.wavelengths_nm, spectrum) * item.art.rgb
     # one half: with both, the sum of a Tessar's faint ghosts is 0.8 % off in blue instead of 0.3 %
-    seen = visible_rays(shot, item.to_pixels, 1)
+    seen = visible_rays(shot, item.in_picture, bundle.halves)
     weights = gathered_weights(shot.packed, bundle, shot.incidence.tilt, colors, shown, seen, careful=careful)
     watch.lap("colour")
     if weights is None:
@@ -450,7 +450,7 @@ def draw_alone(
     small = None if source is None else mapped(source, 0.5**detail * np.eye(2))
     for item in items:
         shifted = item.to_pixels / 2.0**detail + np.array([mx, my, 0.0, 0.0])
-        own_item = replace(item, to_pixels=shifted, source=small)
+        own_item = replace(item, to_pixels=shifted, source=small, pictured=item.to_pixels)
         visible = edge_contrast(item, level)
         draw_final(own_item, quality, sheet, visible, stop=stop, around=beside, detail=0, costs=costs)
     # separate planes hold blocks of float32

@@ -14,7 +14,7 @@ from ...typing import Floats
 from ..scene.path_color import RayFilter, spread_rays
 
 # number of rays that compare the throughput of a path at different wavelengths
-SAMPLE_RAYS = 48
+SAMPLE_RAYS = 128
 # a wavelength with less than this part of the largest flux cannot stand for its neighbours
 LEAST_PART = 0.1
 # largest part of rays with different visibility for which a wavelength can stand for another
@@ -69,14 +69,15 @@ def gathered_weights(
     count = len(weights)
     if len(shown) == count:
         return dict(enumerate(weights))
-    where = spread_rays(bundle, shown, seen, SAMPLE_RAYS)
+    where, half = spread_rays(bundle, shown, seen, SAMPLE_RAYS)
     if where.size == 0 or (careful and not _seen_alike(packed, bundle, tilt, shown, seen)):
         return None
     places, held = bundle.pupil[where], bundle.traced
     rays = np.concatenate([
         held[w][where] if w in held else trace_points(packed, w, bundle.path, tilt, places) for w in range(count)
     ])  # fmt: skip
-    flux = (np.sum([one(rays) for one in seen], axis=0) * rays[:, WEIGHT]).reshape(count, -1).sum(axis=1)
+    passing = np.stack([one(rays) for one in seen])[np.tile(half, count), np.arange(len(rays))]
+    flux = (passing * rays[:, WEIGHT]).reshape(count, -1).sum(axis=1)
     # a coating can make a path dark at a wavelength; there is little light to redistribute then
     least = LEAST_PART * flux.max()
     drawn = tuple(w for w in shown if flux[w] > least) or (int(flux.argmax()),)
@@ -96,7 +97,7 @@ def _seen_alike(
     packed: PackedLens, bundle: Bundle, tilt: float, shown: tuple[int, ...], seen: Sequence[RayFilter]
 ) -> bool:
     """Return whether the same rays are visible at the ends of the spectrum as at the nearest drawn wavelengths."""
-    where = spread_rays(bundle, (), seen, 2 * SAMPLE_RAYS)
+    where, _ = spread_rays(bundle, (), seen, 2 * SAMPLE_RAYS)
     last = len(packed.wavelengths_nm) - 1
     for end, near in ((0, shown[0]), (last, shown[-1])):
         if end == near:

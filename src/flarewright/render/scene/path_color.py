@@ -85,41 +85,45 @@ def _representative_rays(shot: Shot, bundle: Bundle, to_pixels: Floats) -> tuple
     for seen in looks:
         # a sliver can pass at one end of the spectrum only
         for w in waves:
-            chosen = spread_rays(bundle, (w,), seen, RAYS)
+            chosen, _ = spread_rays(bundle, (w,), seen, RAYS)
             if chosen.size > 0:
                 return chosen, w
     return np.empty(0, dtype=np.intp), waves[0]
 
 
-def spread_rays(bundle: Bundle, waves: Sequence[int], passes: Sequence[RayFilter], count: int) -> NDArray[np.intp]:
+def spread_rays(
+    bundle: Bundle, waves: Sequence[int], passes: Sequence[RayFilter], count: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Choose rays that represent a bundle's light.
 
     Parameters
     ----------
     bundle : Bundle
     waves : sequence of int
-        Traced wavelengths at which each ray must pass; empty: choose among all rays.
+        Traced wavelengths at one of which each ray must pass; empty: choose among all rays.
     passes : sequence of callable
         For each half of the bundle, a mask of the traced rays that pass.
     count : int
 
     Returns
     -------
-    ndarray of int
+    nodes : ndarray of int
         Nodes of the bundle, spread evenly over the pupil's area: a node is chosen in proportion to the area of its
         triangles, because the grid is finer at edges and folds. Empty if no ray passes.
+    halves : ndarray of int
+        The half of the bundle in which each was chosen.
     """
     halves, nodes = len(passes), len(bundle.pupil)
-    passing = np.ones((halves, nodes), dtype=np.bool_)
+    passing = np.full((halves, nodes), not waves)
     for w in waves:
-        passing &= [one(bundle.traced[w]) for one in passes]
+        passing |= [one(bundle.traced[w]) for one in passes]
     few = bundle.triangles[:: max(1, len(bundle.triangles) // TRIANGLES)]
     # both halves of a triangle in a row, so that rays are as many places of the pupil as without halves
     triangles = np.stack([few + half * nodes for half in range(halves)], axis=1).reshape(-1, 3)
     chosen: NDArray[np.intp] = choose_representatives(
         np.concatenate([bundle.pupil] * halves), triangles, passing.ravel(), 1, count
     )
-    return chosen % nodes
+    return chosen % nodes, chosen // nodes
 
 
 def visible_rays(shot: Shot, to_pixels: Floats, halves: int) -> tuple[RayFilter, ...]:
