@@ -60,6 +60,8 @@ DRAFTS = (
     (MASKED,),
     (COATED, SPIKES),
     (COATED, FAN),
+    (COLOURS, COATED, SPIKES),
+    (COLOURS, COATED, FAN),
 )
 REFERENCES = ((), (SCATTER,))
 # features that no trait names: their kernels are compiled by `warm-up`, or at their first call

@@ -14,6 +14,7 @@ from numba import njit
 from flarewright.kernels.montecarlo.forward import _cross, _passes_stop
 from flarewright.optics.rays.pupil_region import front_box
 from flarewright.render.reference.batches import spectrum_of
+from flarewright.render.reference.shot_arrays import shot_arrays
 from flarewright.render.scene.shot import Shot
 
 # cells of the front per side; if fewer than FEW are known, they are divided FINER times, up to FINEST per side
@@ -25,15 +26,16 @@ POINTS, COARSE = 12_000, 64
 
 
 @njit(error_model="numpy", cache=True)
-def follow(curvature, form, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, j, i, direction, x0, y0,
-           blades, to_pixels, size, light):  # fmt: skip
+def follow(lens, stop, frame, j, i, direction, x0, y0, light):
     """Set `light` to the weight of each ray from x0, y0 that reflects at j, then at i; 0 outside the picture."""
+    z_vertex, inv_semi, n_gap, reflectance = lens.z_vertex, lens.inv_semi, lens.n_gap, lens.reflectance
+    stop_row, blades, (to_pixels, size) = stop.row, stop.blades, frame
     samples = reflectance.shape[1]
     for ray in range(x0.shape[0]):
         x, y, z = x0[ray], y0[ray], 0.0
         dx, dy, dz = direction[0], direction[1], direction[2]
         weight, row, heading, order = 1.0, 0, 1, 0
-        while weight > 0.0 and row < curvature.shape[0]:
+        while weight > 0.0 and row < z_vertex.shape[0]:
             if row == stop_row:
                 t = (z_vertex[row] - z) / dz
                 x, y, z = x + t * dx, y + t * dy, z_vertex[row]
@@ -44,7 +46,7 @@ def follow(curvature, form, z_vertex, inv_semi, n_gap, reflectance, sensor_z, st
             n_in = n_gap[row] if heading > 0 else n_gap[row + 1]
             n_out = n_gap[row + 1] if heading > 0 else n_gap[row]
             x, y, z, tx, ty, tz, rx, ry, rz, radius2, cos_in, cos_out, met, forth, back = _cross(
-                curvature, form, row, z_vertex[row], x, y, z, dx, dy, dz, float(heading), n_in / n_out
+                lens, row, x, y, z, dx, dy, dz, float(heading), n_in / n_out
             )
             mirror = (order == 0 and row == j) or (order == 1 and row == i)
             if not met or radius2 * inv_semi[row] * inv_semi[row] > 1.0 or not (back if mirror else forth):
@@ -63,7 +65,7 @@ def follow(curvature, form, z_vertex, inv_semi, n_gap, reflectance, sensor_z, st
                 weight *= 1.0 - R
                 dx, dy, dz = tx, ty, tz
             row += heading
-        t = (sensor_z - z) / dz
+        t = (lens.sensor_z - z) / dz
         column, line = to_pixels[0] - to_pixels[2] * (x + t * dx), to_pixels[1] + to_pixels[3] * (y + t * dy)
         inside = 0.0 <= column < size[0] and 0.0 <= line < size[1]
         light[ray] = weight if inside else 0.0
@@ -71,25 +73,22 @@ def follow(curvature, form, z_vertex, inv_semi, n_gap, reflectance, sensor_z, st
 
 def path_flux(shot: Shot, j: int, i: int, batches: int, seed: int = 0) -> tuple[float, float]:
     """Return the luminous flux in the picture of one path, for a distant monochromatic light, and its error."""
-    packed, opening = shot.packed, shot.opening
+    packed = shot.packed
     tilt, axes = shot.incidence.tilt, shot.incidence.axes
     assert packed.nearness == 0.0
-    assert opening.mask is None
+    assert shot.opening.mask is None
     box = front_box(packed, tilt)
     box[0] = -box[1] if packed.symmetric else box[0]
     low, size = box[[0, 2]], box[[1, 3]] - box[[0, 2]]
     direction = np.array([np.sin(tilt) * axes[1, 0], np.sin(tilt) * axes[1, 1], np.cos(tilt)])
-    form = packed.conic if packed.shapes is None else packed.shapes
-    stop_row = int(np.flatnonzero(packed.inv_semi == 0.0)[0])
+    lens, stop, frame = shot_arrays(shot)
+    lens = lens._replace(n_gap=lens.n_gap[0], reflectance=lens.reflectance[0])
     rng = np.random.default_rng([seed, j, i])
 
     def light_at(places):
         x, y = np.ascontiguousarray((places @ axes).T)
         light = np.empty(len(places))
-        follow(
-            packed.curvature, form, packed.z_vertex, packed.inv_semi, packed.n_gap[0], packed.reflectance[0],
-            packed.sensor_z, stop_row, j, i, direction, x, y, opening.blades, shot.to_pixels, shot.size_px, light,
-        )  # fmt: skip
+        follow(lens, stop, frame, j, i, direction, x, y, light)
         return light
 
     known = _passed(light_at, low, size, np.ones((CELLS, CELLS), dtype=bool), rng)
@@ -109,7 +108,7 @@ def path_flux(shot: Shot, j: int, i: int, batches: int, seed: int = 0) -> tuple[
         outside = outside[~known[tuple((outside * side).astype(int).T)]]
         found[batch] = light_at(low + inside * size).sum() / (side * fine) ** 2
         found[batch] += light_at(low + outside * size).sum() / COARSE**2
-    found *= np.prod(size) * spectrum_of(shot, shot.gain, 0)[1][0]
+    found *= np.prod(size) * spectrum_of(shot, shot.gain, 0)[0].luminances[0]
     return float(found.mean()), float(found.std(ddof=1) / np.sqrt(batches))
 
 

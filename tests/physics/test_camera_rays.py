@@ -56,7 +56,7 @@ def from_light(shots, batches=16, side=64):
 
 
 def from_camera(shots, batches=16, count=8192):
-    source = camera_rays.camera_source(shots, spectrum_of(shots[0], 1.0, 0), count=count, light=0)
+    source = camera_rays.camera_source(shots, *spectrum_of(shots[0], 1.0, 0), count=count, light=0)
     rows = len(shots[0].packed.curvature)
     sums = Sums(0, {}, {})
     for batch in range(batches):

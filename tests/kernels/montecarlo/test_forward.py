@@ -180,8 +180,8 @@ def test_conics_and_the_shape_table_agree():
         # use the same points of the front for both
         source = ray_source(shot, 0, side=48, light=0)
         box = np.array([-15.0, 15.0, -16.0, 16.0])
-        before = (*source.before[:10], box, *source.before[11:])
-        found.append(run_batch([replace(source, before=before)], 0, picture=True))
+        source = replace(source, points=source.points._replace(box=box))
+        found.append(run_batch([source], 0, picture=True))
     np.testing.assert_allclose(found[0]["paths"], found[1]["paths"], rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(found[0]["blocks"][0], found[1]["blocks"][0], rtol=1e-6, atol=1e-9)
     # light beyond a rim is counted as LOST by one code path and as AT_BARREL by the other

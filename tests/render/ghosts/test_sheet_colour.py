@@ -1,4 +1,4 @@
-"""A ghost that is drawn on a sheet of its own, coarser than the picture and with a margin, has the colour it has there.
+"""A ghost drawn on a separate sheet, coarser than the picture and with a margin, has the colour of the picture.
 
 The colour depends on the rays that land in the picture: coatings pass other wavelengths at other angles.
 """

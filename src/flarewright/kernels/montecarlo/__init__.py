@@ -4,5 +4,6 @@
 - `backward`: `trace_camera_batch`, rays from the sensor to area lights
 - `radiance`: radiance of area lights along a ray
 - `scattered_rays`: random single scattering of direct light; tallies
+- `arguments`: records that these kernels take
 - `philox`: counter-based random numbers
 """

@@ -7,11 +7,13 @@ a rim or the stop absorbs it, it lands on the sensor plane, or it leaves through
 import numpy as np
 
 from ..jit.decorators import compiled, inner
-from ..raster.iris_mask import mask_value
+from ..raster.iris_mask import transmittance
 from ..tracing.clip import blade_value
 from ..tracing.general_ray import cross_shape
 from ..tracing.intersect import intersect_conic
+from ..tracing.lens_arrays import SHAPED, at_wavelength
 from ..tracing.refract import bend
+from .arguments import Ray, Scratch, scattering_at
 from .philox import refill
 from .radiance import radiance_from
 from .scattered_rays import scatter_once
@@ -40,21 +42,22 @@ def _passes_stop(blades, x, y):
 
 
 @inner
-def _cross(curvature, conic, row, vertex, x, y, z, dx, dy, dz, heading, eta):
+def _cross(lens, row, x, y, z, dx, dy, dz, heading, eta):
     """Trace a ray to a surface, and both refract and reflect it.
 
     Returns the hit, the refracted and the reflected direction, the squared distance from the surface's axis, the
     cosines before and behind the surface, and three flags: the ray hits, it refracts forward, it reflects backward.
     """
-    if conic.ndim == 2:
+    vertex = lens.z_vertex[row]
+    if len(lens) == SHAPED:
         hx, hy, hz, rx, ry, rz, radius2, cos_in, cos_out, back = cross_shape(
-            conic, row, vertex, x, y, z, dx, dy, dz, heading, eta, 1.0
+            lens.shapes, row, vertex, x, y, z, dx, dy, dz, heading, eta, 1.0
         )
         hx, hy, hz, tx, ty, tz, radius2, cos_in, cos_out, on = cross_shape(
-            conic, row, vertex, x, y, z, dx, dy, dz, heading, eta, 0.0
+            lens.shapes, row, vertex, x, y, z, dx, dy, dz, heading, eta, 0.0
         )
         return hx, hy, hz, tx, ty, tz, rx, ry, rz, radius2, cos_in, cos_out, on or back, on, back
-    c, kappa = curvature[row], conic[row]
+    c, kappa = lens.curvature[row], lens.conic[row]
     zl = z - vertex
     t, root, discriminant = intersect_conic(c, kappa, x, y, zl, dx, dy, dz, heading)
     hx, hy, hz = x + t * dx, y + t * dy, zl + t * dz
@@ -66,66 +69,27 @@ def _cross(curvature, conic, row, vertex, x, y, z, dx, dy, dz, heading, eta):
 
 
 @compiled
-def trace_batch(
-    curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, rows, direction, axes, box, side,
-    cumulative, luminances, rgbs, heroes, boosts, key, batch, light, blades, mask, half, to_pixels, size,
-    planes, tallies, paths, fours, scatter,
-):  # fmt: skip
+def trace_batch(lens, samples, points, chances, batch, light, stop, frame, sums, fours, scatter):
     """Trace a batch of points of the front at several wavelengths each, through all orders of reflection.
 
     Parameters
     ----------
-    curvature, conic, z_vertex, inv_semi : ndarray, shape (K,)
-        Geometry of the rows; `conic` may be the shape table in the lens' frame instead, as in `trace_nodes`.
-    n_gap : ndarray, shape (S, K + 1)
-        Index before row 0 and behind each row, per spectral sample.
-    reflectance : ndarray, shape (S, K, M)
-        R against the cosine on the lower-index side, uniform over [0, 1].
-    sensor_z : float
-    rows : tuple of int
-        Row of the stop and row of the first surface.
-    direction : ndarray, shape (4,)
-        Direction of the light's ray through the first vertex, and the light's nearness
-        (`kernels.tracing.sequential.trace_nodes`), 0 for a distant light.
-    axes : ndarray, shape (2, 2)
-        Upright (x, y) of the axes of `box`.
-    box : ndarray, shape (4,)
-        x0, x1, y0, y1 in the plane of the first vertex; points are spread evenly in it.
-    side : int
-        The batch has side x side points, one at a random place in each cell of the box.
-    cumulative : ndarray, shape (S,)
-        Cumulative probability of the spectral samples.
-    luminances : ndarray, shape (S,)
-        Luminance of each sample over its probability.
-    rgbs : ndarray, shape (S, 3)
-        Colour of each sample over its probability.
-    heroes : int
-        Wavelengths traced from each point, evenly spread over the cumulative probability.
-    boosts : ndarray, shape (4,)
-        Probability over reflectance with which a reflection is followed: for the third and fourth reflection, and for
-        later ones. Then the average number of rays that a ray may split off: after two or three reflections, and after
-        more. The last must be below 1: otherwise oblique rays, whose R is much larger than the R from which the boosts
-        were chosen, multiply without end.
-    key : ndarray, shape (2,), uint64
+    lens : ConicLens or ShapedLens
+        At the S spectral samples, in the lens' frame.
+    samples : SpectralSamples
+    points : FrontPoints
+    chances : Chances
     batch, light : int
         Select the stream of random numbers.
-    blades, mask, half
-        As in `draw_bundle`; the mask may be None.
-    to_pixels : ndarray, shape (4,)
-    size : tuple of int
-        Width and height of the picture.
-    planes : ndarray, shape (2, 3, H, W), float32
-        Added to: light after two reflections, and after more; height 0 for no picture.
-    tallies : ndarray, shape (TALLIES,)
-        Added to: luminous flux by where it ended.
-    paths : ndarray, shape (2, K, K)
-        Added to: luminous flux after two reflections by their rows (j, i), in the picture and beside it.
+    stop : StopArrays
+    frame : PictureFrame
+    sums : LightSums
+        Added to.
     fours : ndarray, shape (N, 2)
         Filled, up to its length, with the rays that landed in the picture after four reflections: the rows of the
         reflections as one number in base K, the first times K^3, and the luminous flux. Length 0 to record none.
-    scatter : tuple of ndarray, or None
-        Scatter of the direct light: tables, shape (S, K, 2, M), and amounts, shape (S, K, 2), of the rows; then the
-        arrays `strays` and `plane` of `kernels.montecarlo.scattered_rays`, which are added to. None for no scatter.
+    scatter : Scattering or None
+        Added to; None for no scatter.
 
     Returns
     -------
@@ -138,15 +102,16 @@ def trace_batch(
     followed, with weights R and 1 - R. Later reflections are followed at random, with weights that keep the mean.
     Chaumond 2007 chooses one part at random at every surface, which has the same mean and more noise.
     """
-    points = side * side
-    unit = (box[1] - box[0]) * (box[3] - box[2]) / (points * heroes)
+    direction, axes, box, side, first = points
+    count, heroes = side * side, samples.heroes
+    unit = (box[1] - box[0]) * (box[3] - box[2]) / (count * heroes)
     cell_x, cell_y = (box[1] - box[0]) / side, (box[3] - box[2]) / side
     stream, pool = np.empty(6, dtype=np.uint64), np.empty(4)
-    stack = np.empty((STACK, 11))
+    scratch = Scratch(stream, pool, np.empty((STACK, 11)))
     start = np.empty(6)
-    stream[4], stream[5] = key[0], key[1]
+    stream[4], stream[5] = chances.key[0], chances.key[1]
     noted = 0
-    for point in range(points):
+    for point in range(count):
         stream[0], stream[1] = np.uint64(0), np.uint64(point)
         stream[2], stream[3] = np.uint64(batch), np.uint64(2 * light)
         refill(stream, pool)
@@ -159,42 +124,45 @@ def trace_batch(
         start[0], start[1], start[2] = x, y, 0.0
         start[3], start[4], start[5] = inverse * dx, inverse * dy, inverse * dz
         amount = unit * inverse * inverse * inverse
-        first = rows[1]
-        front = _cross(curvature, conic, first, z_vertex[first], x, y, 0.0, start[3], start[4], start[5], 1.0, 1.0)
-        if not front[12] or front[9] * inv_semi[first] * inv_semi[first] > 1.0:
+        front = _cross(lens, first, x, y, 0.0, start[3], start[4], start[5], 1.0, 1.0)
+        if not front[12] or front[9] * lens.inv_semi[first] * lens.inv_semi[first] > 1.0:
             continue
         chance = pool[2]
         for hero in range(heroes):
-            place = (hero + chance) / heroes
-            s = 0
-            while s < cumulative.shape[0] - 1 and cumulative[s] < place:
-                s += 1
+            s = sample_at(samples, (hero + chance) / heroes)
             stream[0], stream[1] = np.uint64(0), np.uint64(point * heroes + hero)
             stream[2], stream[3] = np.uint64(batch), np.uint64(2 * light + 1)
-            tallies[ENTERED] += amount * luminances[s]
+            sums.tallies[ENTERED] += amount * samples.luminances[s]
+            ray = Ray(start, 1, amount, samples.luminances[s], samples.rgbs[s])
             noted = trace_tree(
-                curvature, conic, z_vertex, inv_semi, n_gap[s], reflectance[s], sensor_z, rows[0], start, 1,
-                amount, luminances[s], rgbs[s], boosts, stream, pool, stack, blades, mask, half, to_pixels, size,
-                planes, tallies, paths, fours, noted, scatter, s, None,
+                at_wavelength(lens, s), ray, chances.boosts, scratch, stop, frame, sums, fours, noted,
+                scattering_at(scatter, s), None,
             )  # fmt: skip
     return noted
 
 
 @inner
-def trace_tree(
-    curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, start, forward,
-    unit, luminance, rgb, boosts, stream, pool, stack, blades, mask, half, to_pixels, size, planes, tallies, paths,
-    fours, noted, scatter, sample, lights,
-):  # fmt: skip
+def sample_at(samples, place):
+    """Return the spectral sample at a place of the cumulative probability."""
+    s = 0
+    while s < samples.cumulative.shape[0] - 1 and samples.cumulative[s] < place:
+        s += 1
+    return s
+
+
+@inner
+def trace_tree(lens, first, boosts, scratch, stop, frame, sums, fours, noted, scatter, lights):
     """Trace one ray and all rays that split off it; return the number of rays recorded in `fours` so far.
 
-    `start` holds place and direction; with `forward` 1 the ray starts in front of row 0, with -1 behind the last row.
     If `lights` is None, light that reaches the sensor is added to the picture. Otherwise the ray was started at the
-    sensor by `kernels.montecarlo.backward`, and `lights` (see `radiance_from`) gives the radiance at the front.
+    sensor by `kernels.montecarlo.backward`, and `lights` are its pixel and the AreaLight that it may meet.
     """
-    count = curvature.shape[0]
-    samples = reflectance.shape[1]
-    bright = unit * luminance
+    count, samples = lens.z_vertex.shape[0], lens.reflectance.shape[1]
+    z_vertex, inv_semi, n_gap, reflectance = lens.z_vertex, lens.inv_semi, lens.n_gap, lens.reflectance
+    start, forward, unit, rgb = first.start, first.forward, first.unit, first.rgb
+    stream, pool, stack = scratch
+    tallies = sums.tallies
+    bright = unit * first.luminance
     drawn = 4
     x, y, z, dx, dy, dz = start[0], start[1], start[2], start[3], start[4], start[5]
     weight = 1.0
@@ -211,19 +179,16 @@ def trace_tree(
             if lights is None:
                 tallies[RETURNED] += bright * weight
             else:
-                radiance = radiance_from(lights, x, y, z, dx, dy, dz)
+                radiance = radiance_from(lights[1], x, y, z, dx, dy, dz)
                 if radiance > 0.0:
                     light = radiance * weight
-                    _arrive(order, mirrors, bright * light, unit * light, rgb, lights, planes, tallies, paths)
+                    _arrive(order, mirrors, bright * light, unit * light, rgb, lights[0], sums)
             ended = True
         elif row >= count and lights is not None:
             ended = True
         elif row >= count:
-            t = (sensor_z - z) / dz
-            seen = _land(
-                x + t * dx, y + t * dy, order, mirrors, bright * weight, unit * weight, rgb, to_pixels, size,
-                planes, tallies, paths,
-            )  # fmt: skip
+            t = (lens.sensor_z - z) / dz
+            seen = _land(x + t * dx, y + t * dy, order, mirrors, bright * weight, unit * weight, rgb, frame, sums)
             if seen and order == 4:
                 if noted < fours.shape[0]:
                     fours[noted, 0], fours[noted, 1] = mirrors, bright * weight
@@ -232,12 +197,11 @@ def trace_tree(
         elif steps >= MOST_STEPS:
             tallies[LOST] += bright * weight
             ended = True
-        elif row == stop_row:
+        elif row == stop.row:
             t = (z_vertex[row] - z) / dz
             x, y, z = x + t * dx, y + t * dy, z_vertex[row]
-            passing = 1.0 if _passes_stop(blades, x, y) else 0.0
-            if mask is not None:
-                passing *= mask_value(mask, half, x, y)
+            passing = 1.0 if _passes_stop(stop.blades, x, y) else 0.0
+            passing *= transmittance(stop.mask, stop.half, x, y)
             tallies[AT_STOP] += bright * weight * (1.0 - passing)
             weight *= passing
             ended = weight == 0.0
@@ -247,7 +211,7 @@ def trace_tree(
             n_in = n_gap[row] if heading > 0 else n_gap[row + 1]
             n_out = n_gap[row + 1] if heading > 0 else n_gap[row]
             x, y, z, tx, ty, tz, rx, ry, rz, radius2, cos_in, cos_out, met, forth, back = _cross(
-                curvature, conic, row, z_vertex[row], x, y, z, dx, dy, dz, np.float64(heading), n_in / n_out
+                lens, row, x, y, z, dx, dy, dz, np.float64(heading), n_in / n_out
             )
             if not met:
                 tallies[LOST] += bright * weight
@@ -297,12 +261,10 @@ def trace_tree(
                 if on > 0.0:
                     weight *= on
                     # a reflecting sensor is an additional row, and scatters nothing
-                    if scatter is not None and order == 0 and row < scatter[0].shape[1]:
+                    if scatter is not None and order == 0 and row < scatter.tables.shape[0]:
                         weight *= 1.0 - scatter_once(
-                            curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, row, x, y, z,
-                            tx, ty, tz, rx - dx, ry - dy, rz - dz, scatter[0][sample, row], scatter[1][sample, row],
-                            stream, pool, bright * weight, unit * weight, rgb, blades, mask, half, to_pixels, size,
-                            scatter[2], scatter[3],
+                            lens, row, (x, y, z), (tx, ty, tz), (rx - dx, ry - dy, rz - dz), scatter, scratch,
+                            (bright * weight, unit * weight), rgb, stop, frame,
                         )  # fmt: skip
                         # `scatter_once` has refilled the pool
                         drawn = 4
@@ -330,8 +292,10 @@ def trace_tree(
 
 
 @inner
-def _land(x, y, order, mirrors, bright, amount, rgb, to_pixels, size, planes, tallies, paths):
+def _land(x, y, order, mirrors, bright, amount, rgb, frame, sums):
     """Add light on the sensor plane to the tallies and, in the picture, to its pixel; return whether it is inside."""
+    to_pixels, size = frame
+    planes, tallies, paths = sums
     column, line = to_pixels[0] - to_pixels[2] * x, to_pixels[1] + to_pixels[3] * y
     inside = 0.0 <= column < size[0] and 0.0 <= line < size[1]
     kind = min(order // 2, 3)
@@ -346,8 +310,9 @@ def _land(x, y, order, mirrors, bright, amount, rgb, to_pixels, size, planes, ta
 
 
 @inner
-def _arrive(order, mirrors, bright, amount, rgb, lights, planes, tallies, paths):
+def _arrive(order, mirrors, bright, amount, rgb, pixel, sums):
     """Add the light at the end of a backward ray to the ray's pixel; light meets its reflections in reverse order."""
+    planes, tallies, paths = sums
     kind = min(order // 2, 3)
     tallies[IN_PICTURE + kind] += bright
     if order == 2:
@@ -355,4 +320,4 @@ def _arrive(order, mirrors, bright, amount, rgb, lights, planes, tallies, paths)
         paths[0, mirrors % count, mirrors // count] += bright
     if order > 0:
         for channel in range(3):
-            planes[min(kind, 2) - 1, channel, np.int64(lights[1][1]), np.int64(lights[1][0])] += amount * rgb[channel]
+            planes[min(kind, 2) - 1, channel, np.int64(pixel[1]), np.int64(pixel[0])] += amount * rgb[channel]

@@ -11,16 +11,12 @@ LEFT, RIGHT, LOW, HIGH, DISTANCE, TO_PUPIL = range(6)
 
 
 @inner
-def radiance_from(lights, x, y, z, dx, dy, dz):
+def radiance_from(light, x, y, z, dx, dy, dz):
     """Return the radiance that enters the lens along a ray traced out through the front.
 
     Parameters
     ----------
-    lights : tuple
-        Four items. The edges of the light's border, shape (N, 5): slopes (tan X, tan Y) of both ends and the radiance,
-        sorted by strips of tan Y; an edge is listed in every strip that it crosses. The pixel, unused here. The bounds,
-        shape (6,): of the slopes, then the distances of the light from the first vertex and from the entrance pupil,
-        mm, both 0 for a distant light. The index of the first edge of each strip, and the end of the last strip.
+    light : AreaLight
     x, y, z, dx, dy, dz : float
         Where the ray leaves the lens, mm, and its unit direction; dz is negative.
 
@@ -35,7 +31,7 @@ def radiance_from(lights, x, y, z, dx, dy, dz):
     area is given by the solid angle seen from the centre of the entrance pupil. The radiance is therefore proportional
     to the cosine towards that centre over the cosine of the ray.
     """
-    border, _, bounds, strips = lights
+    border, bounds, strips = light
     if bounds[DISTANCE] > 0.0:
         t = (-bounds[DISTANCE] - z) / dz
         across, up = (x + t * dx) / bounds[TO_PUPIL], (y + t * dy) / bounds[TO_PUPIL]

@@ -5,11 +5,12 @@ from math import cos, log, pi, sin, sqrt
 import numpy as np
 
 from ..jit.decorators import inner
-from ..raster.iris_mask import mask_value
+from ..raster.iris_mask import transmittance
 from ..scattering.single_scatter import CORE, SHARE, scattered_density
 from ..tracing.clip import blade_value
 from ..tracing.general_ray import cross_shape
 from ..tracing.intersect import intersect_conic
+from ..tracing.lens_arrays import SHAPED
 from ..tracing.refract import bend
 from .philox import refill
 
@@ -21,11 +22,12 @@ BACKWARD = 0.2
 
 
 @inner
-def _forward(curvature, conic, row, vertex, x, y, z, dx, dy, dz, eta):
+def _forward(lens, row, x, y, z, dx, dy, dz, eta):
     """Trace a ray forward to a surface and refract it; returns as `kernels.tracing.general_ray.cross_shape`."""
-    if conic.ndim == 2:
-        return cross_shape(conic, row, vertex, x, y, z, dx, dy, dz, 1.0, eta, 0.0)
-    c, kappa = curvature[row], conic[row]
+    vertex = lens.z_vertex[row]
+    if len(lens) == SHAPED:
+        return cross_shape(lens.shapes, row, vertex, x, y, z, dx, dy, dz, 1.0, eta, 0.0)
+    c, kappa = lens.curvature[row], lens.conic[row]
     zl = z - vertex
     t, root, discriminant = intersect_conic(c, kappa, x, y, zl, dx, dy, dz, 1.0)
     hx, hy, hz = x + t * dx, y + t * dy, zl + t * dz
@@ -35,28 +37,27 @@ def _forward(curvature, conic, row, vertex, x, y, z, dx, dy, dz, eta):
 
 
 @inner
-def scatter_once(
-    curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, stop_row, row, x, y, z, tx, ty, tz, gx, gy, gz,
-    table, amount, stream, pool, bright, flux, rgb, blades, mask, half, to_pixels, size, strays, plane,
-):  # fmt: skip
+def scatter_once(lens, row, place, refracted, along, scatter, scratch, light, rgb, stop, frame):
     """Scatter refracted light once into a random direction and trace it to the sensor without further reflections.
 
     Parameters
     ----------
+    lens : ConicLens or ShapedLens
+        At one wavelength.
     row : int
-        The surface, hit at x, y, z.
-    tx, ty, tz : float
-        Direction of the refracted light.
-    gx, gy, gz : float
+        The surface.
+    place, refracted : tuple of float
+        Where the light hits it, and the direction of the refracted light.
+    along : tuple of float
         Vector along the surface normal, of any length and sign.
-    table, amount
-        Scatter of the surface (`kernels.scattering.single_scatter.scattered_density`).
-    bright, flux : float
+    scatter : Scattering
+        At one wavelength; its sums are added to.
+    scratch : Scratch
+    light : tuple of float
         Luminous flux of the refracted light, and its flux for the picture.
-    strays : ndarray, shape (STRAYS,)
-        Added to: luminous flux of scattered light, by tally.
-    plane : ndarray, shape (3, H, W), float32
-        Added to; height 0 for no picture.
+    rgb : ndarray, shape (3,)
+    stop : StopArrays
+    frame : PictureFrame
 
     Returns
     -------
@@ -67,6 +68,9 @@ def scatter_once(
     -----
     Light that is reflected after scattering is dropped, as in the scatter pass.
     """
+    (x, y, z), (tx, ty, tz), (gx, gy, gz), (bright, flux) = place, refracted, along, light
+    table, amount, strays, plane = scatter.tables[row], scatter.amounts[row], scatter.strays, scatter.plane
+    n_gap, reflectance, pool = lens.n_gap, lens.reflectance, scratch.pool
     back = BACKWARD * amount[SHARE]
     strays[STRAY_ENDED] += bright * back
     n_out = n_gap[row + 1]
@@ -80,7 +84,7 @@ def scatter_once(
     scale = 1.0 / sqrt(ax * ax + ay * ay + az * az)
     ax, ay, az = ax * scale, ay * scale, az * scale
     bx, by, bz = gy * az - gz * ay, gz * ax - gx * az, gx * ay - gy * ax
-    refill(stream, pool)
+    refill(scratch.stream, pool)
     low = 0.1 * CORE
     span = log(2.0 * n_out / low)
     v = low * np.exp(span * pool[0])
@@ -100,32 +104,30 @@ def scatter_once(
     samples = reflectance.shape[1]
     arrives = dz > 0.0
     k = row + 1
-    while arrives and k < curvature.shape[0]:
-        if k == stop_row:
-            t = (z_vertex[k] - z) / dz
-            x, y, z = x + t * dx, y + t * dy, z_vertex[k]
-            for b in range(blades.shape[0]):
-                arrives = arrives and blade_value(blades, b, x, y) <= 0.0
-            if mask is not None:
-                weight *= mask_value(mask, half, x, y)
+    while arrives and k < lens.z_vertex.shape[0]:
+        if k == stop.row:
+            t = (lens.z_vertex[k] - z) / dz
+            x, y, z = x + t * dx, y + t * dy, lens.z_vertex[k]
+            for b in range(stop.blades.shape[0]):
+                arrives = arrives and blade_value(stop.blades, b, x, y) <= 0.0
+            weight *= transmittance(stop.mask, stop.half, x, y)
         else:
             n_in, n_behind = n_gap[k], n_gap[k + 1]
-            x, y, z, dx, dy, dz, radius2, cos_in, cos_out, ok = _forward(
-                curvature, conic, k, z_vertex[k], x, y, z, dx, dy, dz, n_in / n_behind
-            )
-            arrives = ok and radius2 * inv_semi[k] * inv_semi[k] <= 1.0
+            x, y, z, dx, dy, dz, radius2, cos_in, cos_out, ok = _forward(lens, k, x, y, z, dx, dy, dz, n_in / n_behind)
+            arrives = ok and radius2 * lens.inv_semi[k] * lens.inv_semi[k] <= 1.0
             if arrives:
-                place = min(cos_in if n_in <= n_behind else cos_out, 1.0) * (samples - 1)
-                cell = min(np.int64(place), samples - 2)
+                angle = min(cos_in if n_in <= n_behind else cos_out, 1.0) * (samples - 1)
+                cell = min(np.int64(angle), samples - 2)
                 weight *= 1.0 - (
-                    reflectance[k, cell] + (place - cell) * (reflectance[k, cell + 1] - reflectance[k, cell])
+                    reflectance[k, cell] + (angle - cell) * (reflectance[k, cell + 1] - reflectance[k, cell])
                 )
         k += 1
     if not arrives:
         strays[STRAY_ENDED] += bright * share
         return back + share
     strays[STRAY_ENDED] += bright * (share - weight)
-    t = (sensor_z - z) / dz
+    to_pixels, size = frame
+    t = (lens.sensor_z - z) / dz
     column, line = to_pixels[0] - to_pixels[2] * (x + t * dx), to_pixels[1] + to_pixels[3] * (y + t * dy)
     inside = 0.0 <= column < size[0] and 0.0 <= line < size[1]
     strays[STRAY_IN_PICTURE if inside else STRAY_BESIDE] += bright * weight

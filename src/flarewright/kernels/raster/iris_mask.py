@@ -5,10 +5,14 @@ resolution of the one before (`optics.pupil.mask_levels`), so that a pixel reads
 Where a summed-area table of the image's changes shows that the image is constant, no look-up is needed.
 """
 
+from __future__ import annotations
+
 from math import floor, log2
+from typing import NamedTuple
 
 import numpy as np
 
+from ...typing import Floats
 from ..jit.decorators import borrowing, inner
 from ..tracing.clip import PSTOP, cut_to_rectangle, slope_over
 from .polygons import fill_polygon, plane_size
@@ -35,6 +39,27 @@ from .stop_pattern import (
 LEVEL = 0.58
 
 
+class StopArrays(NamedTuple):
+    """The stop and the opening of the iris in it.
+
+    Attributes
+    ----------
+    row : int
+        Of the stop.
+    blades : ndarray, shape (B, 4)
+        Edges of the iris in the upright frame (`optics.pupil.iris.blade_edges`).
+    mask : ndarray, shape (R, C), or None
+        Transmittance (`mask_value`).
+    half : float
+        Half the side of the mask, mm.
+    """
+
+    row: int
+    blades: Floats
+    mask: Floats | None
+    half: float
+
+
 @borrowing
 def mask_value(mask, half, u, v):
     """Interpolate a mask over the square [-half, half] x [-half, half], row 0 at +v; 0 outside."""
@@ -49,6 +74,17 @@ def mask_value(mask, half, u, v):
     upper = mask[r, c] * (1.0 - fx) + mask[r, c + 1] * fx
     lower = mask[r + 1, c] * (1.0 - fx) + mask[r + 1, c + 1] * fx
     return upper * (1.0 - fy) + lower * fy
+
+
+@inner
+def transmittance(mask, half, u, v):
+    """Return the transmittance of a mask as `mask_value`, or 1 if there is none.
+
+    The compiler drops a branch on an argument that is None, but not one on a field of a record.
+    """
+    if mask is None:
+        return 1.0
+    return mask_value(mask, half, u, v)
 
 
 @inner

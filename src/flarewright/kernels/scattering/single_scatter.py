@@ -5,15 +5,20 @@ The scattered share per area of v is the same on both sides of a surface, whatev
 equation.
 """
 
+from __future__ import annotations
+
 from math import exp, log, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
+from ...typing import Floats
 from ..jit.decorators import compiled, inner
-from ..raster.iris_mask import mask_value
+from ..raster.iris_mask import transmittance
 from ..tracing.clip import blade_value
 from ..tracing.general_ray import cross_shape
 from ..tracing.intersect import intersect_conic
+from ..tracing.lens_arrays import SHAPED
 from ..tracing.refract import bend
 
 # scatter tables are uniform in log(v^2 + CORE^2), from LOW to HIGH
@@ -171,18 +176,19 @@ def _beam_at(beam, box, x, y, node):
 
 
 @inner
-def _through(curvature, conic, row, vertex, x, y, z, dx, dy, dz, eta):
+def _through(lens, row, x, y, z, dx, dy, dz, eta):
     """Trace a backward ray to a surface and refract it.
 
     Returns the hit, the new direction, the squared distance from the surface's axis, the cosines before and behind the
     surface, whether the ray hits the surface, and whether the ray continues.
     """
-    if conic.ndim == 2:
+    vertex = lens.z_vertex[row]
+    if len(lens) == SHAPED:
         hx, hy, hz, tx, ty, tz, radius2, cos_in, cos_out, on = cross_shape(
-            conic, row, vertex, x, y, z, dx, dy, dz, -1.0, eta, 0.0
+            lens.shapes, row, vertex, x, y, z, dx, dy, dz, -1.0, eta, 0.0
         )
         return hx, hy, hz, tx, ty, tz, radius2, cos_in, cos_out, on, on
-    c, kappa = curvature[row], conic[row]
+    c, kappa = lens.curvature[row], lens.conic[row]
     zl = z - vertex
     t, root, discriminant = intersect_conic(c, kappa, x, y, zl, dx, dy, dz, -1.0)
     hx, hy, hz = x + t * dx, y + t * dy, zl + t * dz
@@ -192,25 +198,27 @@ def _through(curvature, conic, row, vertex, x, y, z, dx, dy, dz, eta):
 
 
 @inner
-def _normal(curvature, conic, row, vertex, x, y, z, dx, dy, dz):
+def _normal(lens, row, x, y, z, dx, dy, dz):
     """Return the unit normal of a surface at the hit of a backward ray, pointing against the ray."""
-    if conic.ndim == 2:
+    vertex = lens.z_vertex[row]
+    if len(lens) == SHAPED:
         # a reflection changes the direction along the normal
-        _, _, _, rx, ry, rz, _, _, _, _ = cross_shape(conic, row, vertex, x, y, z, dx, dy, dz, -1.0, 1.0, 1.0)
+        _, _, _, rx, ry, rz, _, _, _, _ = cross_shape(lens.shapes, row, vertex, x, y, z, dx, dy, dz, -1.0, 1.0, 1.0)
         nx, ny, nz = rx - dx, ry - dy, rz - dz
     else:
-        c = curvature[row]
-        nx, ny, nz = -c * x, -c * y, 1.0 - c * (1.0 + conic[row]) * (z - vertex)
+        c = lens.curvature[row]
+        nx, ny, nz = -c * x, -c * y, 1.0 - c * (1.0 + lens.conic[row]) * (z - vertex)
     scale = 1.0 / sqrt(nx * nx + ny * ny + nz * nz)
     return nx * scale, ny * scale, nz * scale
 
 
 @inner
-def _back_to(curvature, conic, z_vertex, n_gap, sensor_z, stop_row, target, px, py, wx, wy):
-    """Trace a ray from the sensor to a row; return x and y of the hit, and whether there is one."""
+def _back_to(lens, rows, stop_row, px, py, wx, wy):
+    """Trace a ray from the sensor to the target row; return x and y of the hit, and whether there is one."""
+    target, z_vertex, n_gap = rows.target, lens.z_vertex, lens.n_gap
     scale = -1.0 / sqrt(1.0 + wx * wx + wy * wy)
-    x, y, z, dx, dy, dz = px, py, sensor_z, wx * scale, wy * scale, scale
-    row = np.int64(curvature.shape[0] - 1)
+    x, y, z, dx, dy, dz = px, py, lens.sensor_z, wx * scale, wy * scale, scale
+    row = np.int64(rows.rear)
     while True:
         if row == stop_row:
             t = (z_vertex[row] - z) / dz
@@ -219,9 +227,7 @@ def _back_to(curvature, conic, z_vertex, n_gap, sensor_z, stop_row, target, px, 
                 return x, y, True
         else:
             eta = n_gap[row + 1] / n_gap[row]
-            x, y, z, dx, dy, dz, _, _, _, met, on = _through(
-                curvature, conic, row, z_vertex[row], x, y, z, dx, dy, dz, eta
-            )
+            x, y, z, dx, dy, dz, _, _, _, met, on = _through(lens, row, x, y, z, dx, dy, dz, eta)
             if row == target or not met:
                 return x, y, met
             if not on:
@@ -230,7 +236,7 @@ def _back_to(curvature, conic, z_vertex, n_gap, sensor_z, stop_row, target, px, 
 
 
 @inner
-def _aim(curvature, conic, z_vertex, n_gap, sensor_z, stop_row, target, start, domain, px, py, found):
+def _aim(lens, rows, stop_row, start, domain, px, py, found):
     """Aim the ray from a sensor point at the centre of a domain, by Newton's method.
 
     Fills `found` with slope x, slope y, and the derivatives of the slopes by the place in the domain: xx, xy, yx, yy.
@@ -239,12 +245,12 @@ def _aim(curvature, conic, z_vertex, n_gap, sensor_z, stop_row, target, start, d
     found[2], found[3], found[4], found[5] = start[1], 0.0, 0.0, start[1]
     for _ in range(AIM_STEPS):
         wx, wy = found[0], found[1]
-        x, y, ok = _back_to(curvature, conic, z_vertex, n_gap, sensor_z, stop_row, target, px, py, wx, wy)
+        x, y, ok = _back_to(lens, rows, stop_row, px, py, wx, wy)
         if not ok:
             return
         step = SLOPE_STEP
-        ax, ay, ok_a = _back_to(curvature, conic, z_vertex, n_gap, sensor_z, stop_row, target, px, py, wx + step, wy)
-        bx, by, ok_b = _back_to(curvature, conic, z_vertex, n_gap, sensor_z, stop_row, target, px, py, wx, wy + step)
+        ax, ay, ok_a = _back_to(lens, rows, stop_row, px, py, wx + step, wy)
+        bx, by, ok_b = _back_to(lens, rows, stop_row, px, py, wx, wy + step)
         xx, yx, xy, yy = (ax - x) / step, (ay - y) / step, (bx - x) / step, (by - y) / step
         det = xx * yy - xy * yx
         if not (ok_a and ok_b) or abs(det) < 1e-12:
@@ -257,35 +263,77 @@ def _aim(curvature, conic, z_vertex, n_gap, sensor_z, stop_row, target, start, d
             return
 
 
-@compiled
-def gather_scatter(
-    curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z, rows, tables, amounts, beams, boxes, start,
-    domain, blades, mask, half, axes, side, points, out,
-):  # fmt: skip
-    """Integrate the light that some surfaces scatter onto points of the sensor.
+class ScatterRows(NamedTuple):
+    """Rows of a lens in a sum over scattered light.
 
-    Parameters
+    Attributes
     ----------
-    curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z
-        As in `kernels.tracing.sequential.trace_nodes`.
-    rows : tuple of int
-        Row of the stop; row of the domain; first and last row that scatter.
+    target : int
+        Row at whose domain the rays aim.
+    first, last : int
+        First and last row that scatter.
+    rear : int
+        Last row of the lens; a reflecting sensor behind it is not met.
+    """
+
+    target: int
+    first: int
+    last: int
+    rear: int
+
+
+class DirectBeam(NamedTuple):
+    """The direct light on each row and what it scatters there.
+
+    Attributes
+    ----------
     tables : ndarray, shape (K, 2, M)
     amounts : ndarray, shape (K, 2)
-        Scatter of each row.
-    beams : ndarray, shape (K, S, S, 6)
+        Scatter of each row (`scattered_density`).
+    nodes : ndarray, shape (K, S, S, 6)
+        Columns TX, TY, FLUX, REL, STOP_X, STOP_Y.
     boxes : ndarray, shape (K, 4)
-        The direct beam on each row (columns above), and x0, y0, nodes per mm in x and y.
+        x0, y0, nodes per mm in x and y.
+    """
+
+    tables: Floats
+    amounts: Floats
+    nodes: Floats
+    boxes: Floats
+
+
+class ScatterTarget(NamedTuple):
+    """Where in the lens the rays from the sensor aim.
+
+    Attributes
+    ----------
     start : tuple of float
         Paraxial slope at the sensor per place on the sensor and per place in the domain.
     domain : ndarray, shape (4,)
         Centre x, y, half width and half height of the part of its row from which light may come, mm.
-    blades, mask, half
-        As in `draw_bundle`.
-    axes : ndarray, shape (2, 2)
-        Upright x, y of the frame's axes, for the iris.
     side : int
         Rays from each point: side x side, spread evenly over the domain.
+    """
+
+    start: tuple[float, float]
+    domain: Floats
+    side: int
+
+
+@compiled
+def gather_scatter(lens, rows, beam, aimed, stop, axes, points, out):
+    """Integrate the light that some surfaces scatter onto points of the sensor.
+
+    Parameters
+    ----------
+    lens : ConicLens or ShapedLens
+        At one wavelength.
+    rows : ScatterRows
+    beam : DirectBeam
+    aimed : ScatterTarget
+    stop : StopArrays
+    axes : ndarray, shape (2, 2)
+        Upright x, y of the frame's axes, for the iris.
     points : ndarray, shape (P, 2)
     out : ndarray, shape (P,)
         Added to: irradiance on the sensor per irradiance on the front.
@@ -296,14 +344,16 @@ def gather_scatter(
     behind a surface is E T rho(v) n^2, with E the irradiance of the direct beam there. Radiance over the squared index
     changes along a ray only by the factor T. The irradiance is its integral over slopes, dw / (1 + w^2)^2.
     """
-    stop_row, target, first, last = rows
+    first, last = rows.first, rows.last
+    z_vertex, inv_semi, n_gap, reflectance = lens.z_vertex, lens.inv_semi, lens.n_gap, lens.reflectance
+    domain, side, (stop_row, blades, mask, half) = aimed.domain, aimed.side, stop
     samples = reflectance.shape[1]
     node, aim = np.empty(6), np.empty(6)
     # iris edges are softened over a cell of the grid of rays, both for the traced rays and for the direct beam
     ramp = 2.0 * MARGIN / side
     for p in range(points.shape[0]):
         px, py = points[p, 0], points[p, 1]
-        _aim(curvature, conic, z_vertex, n_gap, sensor_z, stop_row, target, start, domain, px, py, aim)
+        _aim(lens, rows, stop_row, aimed.start, domain, px, py, aim)
         cell = 4.0 * MARGIN * MARGIN * domain[2] * domain[3] / (side * side)
         cell *= abs(aim[2] * aim[5] - aim[3] * aim[4])
         total = 0.0
@@ -314,32 +364,31 @@ def gather_scatter(
             wy = aim[1] + aim[4] * sx + aim[5] * sy
             square = 1.0 + wx * wx + wy * wy
             scale = -1.0 / sqrt(square)
-            x, y, z, dx, dy, dz = px, py, sensor_z, wx * scale, wy * scale, scale
+            x, y, z, dx, dy, dz = px, py, lens.sensor_z, wx * scale, wy * scale, scale
             weight = cell / (square * square)
             # use the least cover: a product would soften coinciding edges twice
             cover = 1.0
-            row = np.int64(curvature.shape[0] - 1)
+            row = np.int64(rows.rear)
             while row >= first and weight * cover > 0.0:
                 if row == stop_row:
                     t = (z_vertex[row] - z) / dz
                     x, y, z = x + t * dx, y + t * dy, z_vertex[row]
                     u, v = x * axes[0, 0] + y * axes[1, 0], x * axes[0, 1] + y * axes[1, 1]
                     cover = min(cover, _covered(blades, ramp * min(domain[2], domain[3]), u, v))
-                    if mask is not None:
-                        weight *= mask_value(mask, half, u, v)
+                    weight *= transmittance(mask, half, u, v)
                     row -= 1
                     continue
                 n_in, n_out = n_gap[row + 1], n_gap[row]
                 hx, hy, hz, tx, ty, tz, radius2, cos_in, cos_out, met, on = _through(
-                    curvature, conic, row, z_vertex[row], x, y, z, dx, dy, dz, n_in / n_out
+                    lens, row, x, y, z, dx, dy, dz, n_in / n_out
                 )
                 if not met:
                     break
                 cover = min(cover, _within(sqrt(radius2) * inv_semi[row], side))
                 if cover <= 0.0:
                     break
-                if row <= last and _beam_at(beams[row], boxes[row], hx, hy, node):
-                    nx, ny, nz = _normal(curvature, conic, row, z_vertex[row], hx, hy, hz, dx, dy, dz)
+                if row <= last and _beam_at(beam.nodes[row], beam.boxes[row], hx, hy, node):
+                    nx, ny, nz = _normal(lens, row, hx, hy, hz, dx, dy, dz)
                     bx, by = node[TX], node[TY]
                     bz = sqrt(max(1.0 - bx * bx - by * by, 0.0))
                     cos_spec = bx * nx + by * ny + bz * nz
@@ -352,11 +401,12 @@ def gather_scatter(
                         u = node[STOP_X] * axes[0, 0] + node[STOP_Y] * axes[1, 0]
                         v = node[STOP_X] * axes[0, 1] + node[STOP_Y] * axes[1, 1]
                         beam_cover = min(beam_cover, _covered(blades, ramp * _opening(blades), u, v))
-                        if mask is not None:
-                            lit *= mask_value(mask, half, u, v)
+                        lit *= transmittance(mask, half, u, v)
                     if lit * beam_cover > 0.0 and cos_spec > 0.0:
                         between = -(dx * bx + dy * by + dz * bz)
-                        lit *= scattered_density(tables[row], amounts[row], n_out, n_in, cos_spec, cos_in, v2, between)
+                        lit *= scattered_density(
+                            beam.tables[row], beam.amounts[row], n_out, n_in, cos_spec, cos_in, v2, between
+                        )
                         total += weight * beam_cover * lit
                 if not on:
                     break

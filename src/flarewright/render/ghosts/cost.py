@@ -41,8 +41,8 @@ class GhostCost:
     triangles : int
         Triangles of all drawings.
     fragments : float
-        Pixels that the triangles cover, each time anew: the area of those whose middle lies in the picture, at the
-        resolution in which the ghost was drawn.
+        Pixels that the triangles cover, counted at each drawing: the area of those whose middle lies in the picture,
+        at the resolution in which the ghost was drawn.
     detail : int
         How often that resolution is halved.
     halved : dict of str to int

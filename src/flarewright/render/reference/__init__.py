@@ -6,6 +6,7 @@ Modules:
 - `ray_generation`: `reference_rays`: start the rays of each light at the light or at the sensor
 - `batches`: `ray_source`, `run_batch`, `Sums`, `batches_in_order`: numbered batches of random rays
 - `camera_rays`: `camera_source`, `run_camera`: rays from the sensor to area lights
+- `shot_arrays`: a shot as the kernels of random rays read it
 - `energy_ledger`: `ledger_of`, `trace_ledger`: where the light that entered the lens ends
 - `four_reflections`: `find_four_reflections`, `find_four_reflections_unbounded`: the bright four-reflection paths
 """

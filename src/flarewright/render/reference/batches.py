@@ -12,15 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kernels.montecarlo.arguments import Chances, FrontPoints, LightSums, Scattering, SpectralSamples
 from ...kernels.montecarlo.forward import BESIDE, ENTERED, IN_PICTURE, TALLIES, trace_batch
 from ...kernels.montecarlo.scattered_rays import STRAYS
 from ...optics.colour.rgb import luminance_weights
 from ...optics.pupil.polygon import content, mapped, points, shape_brightness, solid_angle
 from ...optics.rays.pupil_region import front_box
 from ...optics.scattering.brdf import ScatterTables
-from ...typing import Floats
+from ...typing import Floats, Pixels
 from ..scene.shot import Shot, moved
 from .camera_rays import CameraSource, run_camera
+from .shot_arrays import shot_arrays
 
 Batch = dict[str, NDArray[Any]]
 
@@ -47,8 +49,9 @@ class RaySource:
     Attributes
     ----------
     shot : Shot
-    before, behind : tuple
-        Kernel arguments before and after the number of the batch.
+    points : FrontPoints
+    samples : SpectralSamples
+    chances : Chances
     seed, side, light : int
     followed : tuple of float
     scatter : ScatterTables or None
@@ -57,8 +60,9 @@ class RaySource:
     """
 
     shot: Shot
-    before: tuple[Any, ...]
-    behind: tuple[Any, ...]
+    points: FrontPoints
+    samples: SpectralSamples
+    chances: Chances
     seed: int
     side: int
     light: int
@@ -96,7 +100,7 @@ def ray_source(
         Scatter of the direct light; None: no scatter.
     drawn : bool
         Whether its ghosts are added to the picture; False if they are traced from the camera instead.
-    chances : Chances, optional
+    sampling : SpectralSampling, optional
         Of this shot, or of a shot that differs only in direction and intensity.
 
     Returns
@@ -108,16 +112,9 @@ def ray_source(
     if packed.symmetric:
         box[0] = -box[1]
     direction = np.array([np.sin(tilt) * axes[1, 0], np.sin(tilt) * axes[1, 1], np.cos(tilt), packed.nearness])
-    # rays are traced in the lens frame for every light
-    form = packed.conic if packed.shapes is None else packed.shapes
-    before = (
-        packed.curvature, form, packed.z_vertex, packed.inv_semi, packed.n_gap, packed.reflectance,
-        packed.sensor_z, (int(np.flatnonzero(packed.inv_semi == 0.0)[0]), packed.first_surface), direction, axes, box,
-        side, *spectrum_of(shot, shot.gain, seed, followed, sampling),
-    )  # fmt: skip
-    opening = shot.opening
-    behind = (light, opening.blades, opening.mask, opening.half, shot.to_pixels, shot.size_px)
-    return RaySource(shot, before, behind, seed, side, light, followed, scatter, drawn)
+    points = FrontPoints(direction, axes, box, side, packed.first_surface)
+    samples, chances = spectrum_of(shot, shot.gain, seed, followed, sampling)
+    return RaySource(shot, points, samples, chances, seed, side, light, followed, scatter, drawn)
 
 
 def _split_limits(followed: tuple[float, float]) -> Floats:
@@ -163,8 +160,8 @@ def spectrum_of(
     seed: int,
     followed: tuple[float, float] = (FOLLOWED, FOLLOWED),
     sampling: SpectralSampling | None = None,
-) -> tuple[Any, ...]:
-    """Return the arguments of `trace_batch` about wavelengths and chance, from `cumulative` to `key`.
+) -> tuple[SpectralSamples, Chances]:
+    """Return the wavelengths among which random rays choose, and their chances, as kernel arguments.
 
     Parameters
     ----------
@@ -173,21 +170,22 @@ def spectrum_of(
         Factor for a light of irradiance or radiance 1.
     seed : int
     followed : tuple of float
-    chances : Chances, optional
+    sampling : SpectralSampling, optional
         As in `ray_source`.
 
     Returns
     -------
-    tuple
+    samples : SpectralSamples
+    chances : Chances
     """
     known = spectral_sampling(shot) if sampling is None else sampling
     colors = known.over * gain * known.rgb
     # the lens' R determines how many reflections of high order to follow
+    boosts = np.concatenate([np.array(followed) / max(known.reflected, 1e-9), _split_limits(followed)])
     return (
-        known.cumulative, colors @ known.luminance, colors, min(HEROES, len(colors)),
-        np.concatenate([np.array(followed) / max(known.reflected, 1e-9), _split_limits(followed)]),
-        np.array([seed & 0xFFFFFFFF, seed >> 32], dtype=np.uint64),
-    )  # fmt: skip
+        SpectralSamples(known.cumulative, colors @ known.luminance, colors, min(HEROES, len(colors))),
+        Chances(boosts, np.array([seed & 0xFFFFFFFF, seed >> 32], dtype=np.uint64)),
+    )
 
 
 def _aimed(source: RaySource, batch: int) -> Iterator[RaySource]:
@@ -276,17 +274,14 @@ def run_batch(
     nowhere, ghosts = np.zeros((2, 3, 0, 0), dtype=np.float32), 0.0
     for source in (aimed for each in sources for aimed in _aimed(each, batch)):
         room, ghosts_before = np.empty((fours, 2)), figures[IN_PICTURE + 1 : BESIDE].sum()
-        table = source.scatter
-        scatter = None if table is None else (table.tables, table.amounts, strays, plane)
-        own = planes if source.drawn else nowhere
-        recorded = trace_batch(*source.before, batch, *source.behind, own, figures[:TALLIES], paths, room, scatter)
+        sums = LightSums(planes if source.drawn else nowhere, figures[:TALLIES], paths)
+        recorded = _trace(source, batch, sums, room, strays, plane)
         ghosts += (figures[IN_PICTURE + 1 : BESIDE].sum() - ghosts_before) * source.drawn
         if 0 < fours < recorded:
             # trace the same rays again with room for all records
             room = np.empty((recorded, 2))
-            aside = np.zeros(TALLIES), np.zeros_like(paths)
-            elsewhere = None if table is None else (table.tables, table.amounts, np.zeros(STRAYS), nowhere[0])
-            trace_batch(*source.before, batch, *source.behind, nowhere, *aside, room, elsewhere)
+            aside = LightSums(nowhere, np.zeros(TALLIES), np.zeros_like(paths))
+            _trace(source, batch, aside, room, np.zeros(STRAYS), nowhere[0])
         records.append(room[:recorded])
     for camera in cameras:
         ghosts += run_camera(camera, batch, planes, np.zeros_like(paths))[1:].sum()
@@ -303,6 +298,16 @@ def run_batch(
         two, more, *stray = (_in_blocks(plane) for plane in light)
         result |= {"planes": planes, "blocks": np.stack([two, two + more, *stray])}
     return result
+
+
+def _trace(source: RaySource, batch: int, sums: LightSums, fours: Floats, strays: Floats, plane: Pixels) -> int:
+    """Trace a batch of one light; return the number of rays after four reflections."""
+    table, (lens, stop, frame) = source.scatter, shot_arrays(source.shot)
+    scatter = None if table is None else Scattering(table.tables, table.amounts, strays, plane)
+    recorded: int = trace_batch(
+        lens, source.samples, source.points, source.chances, batch, source.light, stop, frame, sums, fours, scatter
+    )
+    return recorded
 
 
 def _in_blocks(plane: Floats) -> Floats:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
+from ...kernels.montecarlo.arguments import AreaLight, Chances, LightSums, PicturePoints, SpectralSamples
 from ...kernels.montecarlo.backward import trace_camera_batch
 from ...kernels.montecarlo.forward import BESIDE, IN_PICTURE, TALLIES
 from ...kernels.tracing.intersect import AXES, ORIGIN, sag_of_shape
@@ -16,6 +16,7 @@ from ...optics.pupil.polygon import WEIGHT, mapped, points, solid_angle
 from ...optics.rays.pack import PackedLens
 from ...typing import Floats, Indices, Pixels
 from ..scene.shot import Shot
+from .shot_arrays import shot_arrays
 
 # circles and directions that sample the last surface, and a margin for what lies between them
 CIRCLES, DIRECTIONS, DISC_MARGIN = 17, 48, 1.01
@@ -31,23 +32,36 @@ class CameraSource:
 
     Attributes
     ----------
-    before, behind : tuple
-        Kernel arguments before and after the number of the batch.
+    shot : Shot
+        Its first part.
+    points : PicturePoints
+    samples : SpectralSamples
+    chances : Chances
+    number : int
+        Of the light.
+    light : AreaLight
     """
 
-    before: tuple[Any, ...]
-    behind: tuple[Any, ...]
+    shot: Shot
+    points: PicturePoints
+    samples: SpectralSamples
+    chances: Chances
+    number: int
+    light: AreaLight
 
 
-def camera_source(shots: Sequence[Shot], spectrum: tuple[Any, ...], *, count: int, light: int) -> CameraSource:
+def camera_source(
+    shots: Sequence[Shot], samples: SpectralSamples, chances: Chances, *, count: int, light: int
+) -> CameraSource:
     """Prepare an area light for rays from the sensor.
 
     Parameters
     ----------
     shots : sequence of Shot
         The parts of the light.
-    spectrum : tuple
-        Arguments about wavelengths and chance (`batches.spectrum_of`) for a light of irradiance 1.
+    samples : SpectralSamples
+        For a light of irradiance 1 (`batches.spectrum_of`).
+    chances : Chances
     count : int
         Points of the picture per batch.
     light : int
@@ -58,23 +72,14 @@ def camera_source(shots: Sequence[Shot], spectrum: tuple[Any, ...], *, count: in
     CameraSource
     """
     shot = shots[0]
-    packed, opening = shot.packed, shot.opening
-    form = packed.conic if packed.shapes is None else packed.shapes
-    stop_row = int(np.flatnonzero(packed.inv_semi == 0.0)[0])
-    before = (
-        packed.curvature, form, packed.z_vertex, packed.inv_semi, packed.n_gap, packed.reflectance, packed.sensor_z,
-        stop_row, rear_disc(shot), count, *spectrum,
-    )  # fmt: skip
     border = np.concatenate([_bright(part) for part in shots])
     ends = points(border)
     distance = 0.0 if shot.light.distance is None else shot.light.distance
-    to_pupil = distance + packed.first_order.entrance_pupil_z if distance > 0.0 else 0.0
+    to_pupil = distance + shot.packed.first_order.entrance_pupil_z if distance > 0.0 else 0.0
     bounds = np.array([*np.stack([ends.min(axis=0), ends.max(axis=0)], axis=1).ravel(), distance, to_pupil])
     in_strips, first = _in_strips(border)
-    behind = (
-        light, opening.blades, opening.mask, opening.half, shot.to_pixels, shot.size_px, in_strips, bounds, first,
-    )  # fmt: skip
-    return CameraSource(before, behind)
+    points_of_batch = PicturePoints(count, rear_disc(shot))
+    return CameraSource(shot, points_of_batch, samples, chances, light, AreaLight(in_strips, bounds, first))
 
 
 def _in_strips(border: Floats) -> tuple[Floats, Indices]:
@@ -157,5 +162,9 @@ def run_camera(source: CameraSource, batch: int, planes: Pixels, paths: Floats) 
         Luminous flux in the picture after 0, 2, 4 and more reflections.
     """
     tallies = np.zeros(TALLIES)
-    trace_camera_batch(*source.before, batch, *source.behind, planes, tallies, paths)
+    lens, stop, frame = shot_arrays(source.shot)
+    trace_camera_batch(
+        lens, source.samples, source.points, source.chances, batch, source.number, stop, frame, source.light,
+        LightSums(planes, tallies, paths),
+    )  # fmt: skip
     return tallies[IN_PICTURE:BESIDE]

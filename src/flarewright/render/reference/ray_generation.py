@@ -84,8 +84,8 @@ def reference_rays(
 
 
 def _camera(parts: Sequence[Shot], seed: int, side: int, number: int) -> CameraSource:
-    spectrum = spectrum_of(parts[0], 1.0, seed)
-    return camera_source(parts, spectrum, count=side * side, light=CAMERA + number)
+    samples, chances = spectrum_of(parts[0], 1.0, seed)
+    return camera_source(parts, samples, chances, count=side * side, light=CAMERA + number)
 
 
 def _from_camera(parts: Sequence[Shot], quality: Quality) -> bool:

@@ -12,7 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernels.scattering.single_scatter import FLUX, gather_scatter, spread_polar
+from ...kernels.raster.iris_mask import StopArrays
+from ...kernels.scattering.single_scatter import (
+    FLUX,
+    DirectBeam,
+    ScatterRows,
+    ScatterTarget,
+    gather_scatter,
+    spread_polar,
+)
 from ...model import Layer, Lens
 from ...model.lens.scatter import Scatter
 from ...optics.lens.paths import direct_path
@@ -316,11 +324,10 @@ def _gather_group(
     nodes[..., FLUX] *= left[:, None, None]
     out = np.zeros(len(points))
     gather_scatter(
-        packed.curvature[:own], packed.form[:own], packed.z_vertex[:own], packed.inv_semi[:own],
-        packed.n_gap[w][: own + 1], packed.reflectance[w][:own], packed.sensor_z,
-        (lens.stop_row, target, first, last), tables.tables[w], tables.amounts[w], nodes, beams.boxes[:own],
-        _start(packed, w, target), beams.domains[target], opening.blades, opening.mask, opening.half,
-        shot.incidence.axes, rays, points, out,
+        packed.arrays(packed.n_gap[w], packed.reflectance[w]), ScatterRows(target, first, last, own - 1),
+        DirectBeam(tables.tables[w], tables.amounts[w], nodes, beams.boxes[:own]),
+        ScatterTarget(_start(packed, w, target), beams.domains[target], rays),
+        StopArrays(lens.stop_row, opening.blades, opening.mask, opening.half), shot.incidence.axes, points, out,
     )  # fmt: skip
     return out
 
