@@ -13,7 +13,7 @@ from oracle import estimate
 from prescriptions import HELIAR, TRIPLET, ghost_table_of, lens, system
 from sensor_rays import trace_rays
 
-from flarewright.io.lens.dotlens import read_dotlens
+from flarewright.io.lens.formats.dotlens import read_dotlens
 from flarewright.kernels.raster.bundle import draw_bundle, node_densities
 from flarewright.kernels.raster.polygons import blank_plane, to_pixels
 from flarewright.kernels.tracing.sequential import ALIVE, STOP_X, WEIGHT, X, Y

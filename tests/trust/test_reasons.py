@@ -15,7 +15,7 @@ from flarewright.cli.render.options.record import RenderOptions
 from flarewright.errors import FlarewrightError, ProjectError
 from flarewright.io.images.photo import open_photo
 from flarewright.io.lens.coating_text import read_coating_file
-from flarewright.io.lens.dotlens import read_dotlens
+from flarewright.io.lens.formats.dotlens import read_dotlens
 from flarewright.io.measurement.captures import read_camera
 from flarewright.io.project.scene_file import read_scene
 from flarewright.measure.merging.exposure_check import refuse_contradiction

@@ -20,7 +20,7 @@ from ..errors import FlarewrightError, OutputError, ProjectError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..io.lens.codev import FirstColumn
+    from ..io.lens.formats.codev import FirstColumn
     from ..optics.lens_import.patent_repair import Apertures
     from ..typing import Progress
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from ..errors import LensError
 from ..io.files.atomic_write import write_atomically
+from ..io.lens.formats.optiland import optiland_text
+from ..io.lens.formats.table_writer import csv_text, dotlens_text
 from ..io.lens.lens_writer import write_lens
-from ..io.lens.optiland import optiland_text
-from ..io.lens.table_writer import csv_text, dotlens_text
-from ..io.lens.zemax_writer import LensState, zmx_text
+from ..io.lens.zemax.writer import LensState, zmx_text
 from ..model import Iris, Lens, Surface
 from ..optics.lens.zoom import at_position
 from ..render.scene.resolve import first_order

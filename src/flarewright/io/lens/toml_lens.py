@@ -30,8 +30,10 @@ from ..files.door import shown
 from ..files.file_kind import OPTILAND_KEY, foreign_hint, lens_key, refuse_other_kind
 from ..files.sentences import count, did_you_mean, shorten, summary, validation_sentences
 from ..files.text_file import read_bytes, read_toml
-from . import codev, dotlens, media, optiland, realflare, tables, zemax
+from . import media
 from .coating_text import coating_from
+from .foreign_file import MOST_SURFACES
+from .formats import codev, dotlens, optiland, realflare, tables
 from .lens_fields import (
     CURVATURE,
     RADIUS,
@@ -45,13 +47,12 @@ from .lens_fields import (
 )
 from .scatter_text import read_scatter
 from .shape_fields import read_elements, read_positions, read_shape
+from .zemax import reader as zemax
 
 # tolerance of a rim beyond the surface's equator, for rounded numbers
 ROUNDED = 1e-6
 # asphere terms that change the rim's height by more than this factor have wrong units
 MOST_LIFTED = 1.0
-MOST_ROWS = 500
-"""Largest number of rows: photographic lenses have up to sixty; longer files are not lenses."""
 
 
 def read_lens(
@@ -226,8 +227,8 @@ def _rows(
     if not isinstance(table, list):
         problems.append(f"rows is {shorten(table)}, a list of tables was expected")
         return []
-    if len(table) > MOST_ROWS:
-        problems.append(f"rows has {len(table)} entries, a lens has at most {MOST_ROWS}")
+    if len(table) > MOST_SURFACES:
+        problems.append(f"rows has {len(table)} entries, a lens has at most {MOST_SURFACES}")
         return []
     rows: list[Row | None] = []
     for k, entry in enumerate(table):

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from ...errors import GlassError, LensError, ProjectError, naming
 from ...io.files.sentences import summary, validation_sentences
 from ...io.images.height_image import read_heights
-from ...io.lens.codev import FirstColumn
+from ...io.lens.formats.codev import FirstColumn
 from ...io.lens.library import in_library, lens_path
 from ...io.lens.media import attach
 from ...io.lens.media import complete_medium as complete_media

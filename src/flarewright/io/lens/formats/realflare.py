@@ -9,16 +9,15 @@ Source: the program's model files.
 
 from __future__ import annotations
 
-import math
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from flarewright.errors import FileError, LensError
+from flarewright.errors import LensError
 from flarewright.model.lens.raw_lens import RawSequence
 
-from ..files.sentences import shorten
-from ..files.text_file import read_json
+from ...files.sentences import shorten
+from ...files.text_file import read_json
+from ..foreign_file import json_number, lens_errors
 from .table_rows import TableHead, TableRow, sequence_of
 
 # None: each element has it
@@ -42,10 +41,8 @@ def read_realflare(path: str | Path) -> RawSequence:
     LensError
         When the file cannot be read or is no such lens; `problems` lists every error with its element, from 0.
     """
-    try:
+    with lens_errors():
         data = read_json(path, "a lens of RealFlare", foreign=True)
-    except FileError as error:
-        raise LensError(str(error), (str(error),)) from error
     elements = data.get("lens_elements") if isinstance(data, dict) else None
     if not isinstance(data, dict) or not isinstance(elements, list):
         raise LensError(f"{path} has no list lens_elements: is it a lens of RealFlare?")
@@ -71,7 +68,7 @@ def _row(k: int, entry: Any, stop: bool, head: TableHead) -> TableRow | None:
         head.remarks.append(f"element {k}: keys left out: {', '.join(shorten(key) for key in unknown[:8])}")
     values: dict[str, float] = {}
     for key, default in _KEYS.items():
-        value = _number(entry.get(key, default))
+        value = json_number(entry.get(key, default))
         if value is None:
             found = shorten(entry[key]) if key in entry else "missing"
             head.problems.append(f"element {k}: {key} is {found}, a number was expected")
@@ -96,20 +93,11 @@ def _notes(data: dict[str, Any]) -> str:
 
 def _stated(data: dict[str, Any], key: str, head: TableHead) -> float | None:
     """Return a number above 0; 0 and a missing one are unknown."""
-    value = _number(data.get(key, 0))
+    value = json_number(data.get(key, 0))
     if value is None or value < 0.0:
         head.problems.append(f"{key} is {shorten(data[key])}, a number was expected")
         return None
     return value or None
-
-
-def _number(value: object) -> float | None:
-    """Return a finite number, None for anything else, such as a whole number that no float can hold."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    with suppress(OverflowError):
-        return float(value) if math.isfinite(value) else None
-    return None
 
 
 __all__ = ["read_realflare"]

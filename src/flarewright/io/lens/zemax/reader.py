@@ -2,7 +2,7 @@
 
 The text has one keyword per line; the lines of a surface are indented below its `SURF n`. The reader uses NAME, NOTE,
 UNIT, GCAT, the aperture (FNUM, ENPD, FLOA, OBNA), the fields (FTYP, XFLN, YFLN), the primary wavelength (WAVM, PWAV),
-and of each surface TYPE, CURV, CONI, PARM, XDAT, DISZ, GLAS, DIAM, CLAP, FLAP, COAT and STOP. `zemax_keywords` lists
+and of each surface TYPE, CURV, CONI, PARM, XDAT, DISZ, GLAS, DIAM, CLAP, FLAP, COAT and STOP. `keywords` lists
 the keywords without effect on a ghost; a remark names every other one. `optics.lens_import.sequential_import` makes a
 lens of the result.
 
@@ -19,23 +19,23 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from flarewright.errors import FileError, GlassError, LensError
+from flarewright.errors import GlassError, LensError
 from flarewright.model import Medium, Surface
 from flarewright.model.lens.prescription import MOST_TERMS
 from flarewright.model.lens.raw_lens import Configuration, RawSequence, SequenceRow
 
-from ..files.door import sentences_for, shown
-from ..files.sentences import did_you_mean, shorten, summary, validation_sentences
-from ..files.text_file import read_bytes
-from . import media
-from .glass_catalogue import CatalogueGlass, by_name, same_name
-from .lens_fields import CURVATURE, ROW_NUMBERS
-from .zemax_configurations import configurations
-from .zemax_keywords import APERTURES, HARMLESS, HARMLESS_OF_SURFACE, USED, USED_OF_SURFACE, VIGNETTING
-from .zemax_text import Block, Text, decoded, grouped, number_of
+from ...files.door import sentences_for, shown
+from ...files.sentences import did_you_mean, shorten, summary, validation_sentences
+from ...files.text_file import read_bytes
+from .. import media
+from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_errors, number_of
+from ..glass_catalogue import CatalogueGlass, by_name, same_name
+from ..lens_fields import CURVATURE, ROW_NUMBERS
+from .configurations import configurations
+from .keywords import APERTURES, HARMLESS, HARMLESS_OF_SURFACE, USED, USED_OF_SURFACE, VIGNETTING
+from .text import Block, Text, grouped
 
 _MM = {"MM": 1.0, "CM": 10.0, "IN": 25.4, "INCH": 25.4, "METER": 1000.0, "M": 1000.0}
-_MOST_SURFACES = 500
 # value in a GLAS line for a glass without numbers
 _NO_NUMBERS = ((0.0, 0.0), (1.5, 40.0))
 # the numbers of a GLAS line take precedence over a name whose n_d differs by more
@@ -44,8 +44,6 @@ _AIR = ("AIR", "VACUUM")
 _AIR_TOLERANCE = 5e-4
 # a larger semi-diameter in mm is a misprint
 _WIDEST = 2000.0
-# a gap of this many units is infinite
-_INFINITE = 1e9
 _VISIBLE_UM = (0.36, 0.83)
 # largest number of unknown keywords that are named
 _LISTED = 8
@@ -74,13 +72,11 @@ def read_zmx(path: str | Path) -> RawSequence:
     LensError
         When the file cannot be read or is not supported; `problems` gives each surface by the file's number.
     """
-    try:
+    with lens_errors():
         data = read_bytes(path, "a .zmx file")
         with sentences_for(path, "a .zmx file"):
             found = grouped(decoded(data))
             raw = _sequential(Path(path), found)
-    except FileError as error:
-        raise LensError(str(error), (str(error),)) from error
     if raw is None or found.problems:
         raise LensError(summary(str(path), found.problems), tuple(found.problems))
     return raw
@@ -93,8 +89,8 @@ def _sequential(path: Path, found: Text) -> RawSequence | None:
         found.problems.append(f"MODE {mode[:40]}: the file is not sequential and holds no prescription")
     elif len(found.blocks) < 4:
         found.problems.append("the SURF blocks of object, lens and image are missing: is it a .zmx file?")
-    elif len(found.blocks) > _MOST_SURFACES:
-        found.problems.append(f"it has {len(found.blocks)} surfaces, a lens has at most {_MOST_SURFACES}")
+    elif len(found.blocks) > MOST_SURFACES:
+        found.problems.append(f"it has {len(found.blocks)} surfaces, a lens has at most {MOST_SURFACES}")
     return None if found.problems else _sequence(path, found)
 
 
@@ -128,7 +124,7 @@ def _sequence(path: Path, found: Text) -> RawSequence | None:
     stated = stops[0].surface.semi_diameter if stops else None
     one = Configuration(
         number=1, **aperture, stop_semi_diameter=stated, field_deg=field_deg, image_height=image_height,
-        focus_distance=None if not 0.0 < distance < 1e9 else distance,
+        focus_distance=None if not 0.0 < distance < INFINITE else distance,
     )  # fmt: skip
     several = configurations(found, one, stops[0].number if stops else None, mm)
     return RawSequence(
@@ -182,7 +178,7 @@ def _glass_of(block: Block) -> list[str]:
 def _gap(block: Block, found: Text) -> float:
     """Return the distance to the next surface in the file's unit; appends an error for an infinite gap in the lens."""
     gap = _length(block, "DISZ", found.problems, infinite=math.inf)
-    if abs(gap) < _INFINITE:
+    if abs(gap) < INFINITE:
         return gap
     if block.number == len(found.blocks) - 2:
         found.remarks.append("the file's image lies at infinity; the sensor is placed at the paraxial focus")
@@ -225,7 +221,7 @@ def _shape(block: Block, mm: float, found: Text) -> dict[str, object]:
         terms = {n: block.parameters.get(n, 0.0) for n in block.parameters if n > 0}
     elif block.kind == "XASPHERE":
         unit = block.extra.get(2, 1.0) or 1.0
-        most = min(max(int(block.extra.get(1, 0.0)), 0), _MOST_SURFACES)
+        most = min(max(int(block.extra.get(1, 0.0)), 0), MOST_SURFACES)
         terms = {n: block.extra.get(n + 2, 0.0) / unit ** (2 * n) for n in range(1, most + 1)}
         # other programs write the terms as those of an even asphere
         plain = {n: value for n, value in block.parameters.items() if n > 0 and value}
@@ -470,8 +466,8 @@ def _field(found: Text, mm: float) -> tuple[float | None, float | None]:
     columns = []
     for axis in "XY":
         words = found.head.get(f"{axis}FLN") or found.head.get(f"{axis}FLD") or []
-        columns.append([number_of(word) or 0.0 for word in words])
-    largest = max((math.hypot(x, y) for x, y in zip(*columns, strict=False)), default=0.0)
+        columns.append([number_of(word) for word in words])
+    largest = largest_field(*columns)
     if largest <= 0.0:
         return None, None
     if kind == 0 and largest < 90.0:
@@ -499,4 +495,4 @@ def _length(block: Block, key: str, problems: list[str], infinite: float) -> flo
     return infinite if words and words[0].upper() == "INFINITY" else _number(block, key, problems)
 
 
-__all__ = ["decoded", "read_zmx"]
+__all__ = ["read_zmx"]

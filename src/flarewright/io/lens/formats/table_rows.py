@@ -14,12 +14,12 @@ from flarewright.model import Surface
 from flarewright.model.lens.prescription import LARGEST_F_NUMBER, LEAST_F_NUMBER
 from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
 
-from ..files.door import shown
-from ..files.sentences import summary, validation_sentences
-from . import media
-from .medium_names import numbered_medium
+from ...files.door import shown
+from ...files.sentences import summary, validation_sentences
+from .. import media
+from ..foreign_file import MOST_SURFACES
+from ..medium_names import numbered_medium
 
-MOST_ROWS = 500
 _TIGHTEST = 1e-3
 
 
@@ -93,10 +93,10 @@ def sequence_of(path: str, head: TableHead, rows: Sequence[TableRow]) -> RawSequ
     """
     problems = head.problems
     findings: list[tuple[int, media.Finding]] = []
-    made = [_row(row, head, findings) for row in rows[:MOST_ROWS]]
+    made = [_row(row, head, findings) for row in rows[:MOST_SURFACES]]
     stops = [row for row in rows if row.stop]
-    if len(rows) > MOST_ROWS:
-        problems.append(f"the table has {len(rows)} rows, a lens has at most {MOST_ROWS}")
+    if len(rows) > MOST_SURFACES:
+        problems.append(f"the table has {len(rows)} rows, a lens has at most {MOST_SURFACES}")
     elif not rows and not problems:
         problems.append("the table has no rows")
     elif len(stops) != 1 and not problems:

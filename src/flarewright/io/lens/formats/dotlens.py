@@ -16,15 +16,15 @@ from flarewright.errors import LensError
 from flarewright.model import Medium
 from flarewright.model.lens.raw_lens import RawLens, RawRow
 
-from ..files.sentences import did_you_mean, shorten, summary
-from ..files.text_file import read_text
-from . import media
-from .lens_fields import ROW_NUMBERS
+from ...files.sentences import did_you_mean, shorten, summary
+from ...files.text_file import read_text
+from .. import media
+from ..foreign_file import MOST_SURFACES, lens_errors
+from ..lens_fields import ROW_NUMBERS
 
 _COLUMNS = ("radius", "thickness", "index", "Abbe number", "aperture", "coating layers")
 _COUNTS = re.compile(r"(\d+)\s+surfaces?(?:,\s*(\d+)\s+glass elements?)?")
 _F_NUMBER = re.compile(r"\bf/\s*(\d+(?:\.\d+)?)")
-_MOST_ROWS = 500
 _WIDEST = 2000.0
 _TIGHTEST = 1e-3
 
@@ -45,10 +45,8 @@ def read_dotlens(path: str | Path) -> RawLens:
     LensError
         When the file cannot be read or its table is broken; `problems` lists every error with its line.
     """
-    try:
+    with lens_errors():
         text = read_text(path, "a .lens file")
-    except ValueError as error:
-        raise LensError(str(error), (str(error),)) from None
     reading = _Reading()
     in_table = False
     for number, line in enumerate(text.split("\n"), start=1):
@@ -68,8 +66,8 @@ def read_dotlens(path: str | Path) -> RawLens:
         reading.problems.append('there is no line "surfaces:" with a table behind it: is it a .lens file?')
     elif not reading.rows and not reading.problems:
         reading.problems.append('the table behind "surfaces:" is empty')
-    if len(reading.rows) > _MOST_ROWS:
-        reading.problems.append(f"the table has {len(reading.rows)} rows, a lens has at most {_MOST_ROWS}")
+    if len(reading.rows) > MOST_SURFACES:
+        reading.problems.append(f"the table has {len(reading.rows)} rows, a lens has at most {MOST_SURFACES}")
     if reading.problems:
         raise LensError(summary(str(path), reading.problems), tuple(reading.problems))
     return _finish(Path(path), reading)

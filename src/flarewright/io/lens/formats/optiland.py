@@ -17,20 +17,19 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from flarewright.errors import FileError, LensError
+from flarewright.errors import LensError
 from flarewright.model import Lens, Medium, Stop, Surface
 from flarewright.model.lens.prescription import MOST_TERMS
 from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
 
-from ..files.door import sentences_for, shown
-from ..files.sentences import shorten, summary, validation_sentences
-from ..files.text_file import read_json
-from . import media
-from .lens_fields import CURVATURE
-from .medium_names import numbered_medium
+from ...files.door import sentences_for, shown
+from ...files.sentences import shorten, summary, validation_sentences
+from ...files.text_file import read_json
+from .. import media
+from ..foreign_file import INFINITE, MOST_SURFACES, json_number, largest_field, lens_errors
+from ..lens_fields import CURVATURE
+from ..medium_names import numbered_medium
 
-_MOST_SURFACES = 500
-_INFINITE = 1e9
 _ROUNDED = 1e-6
 _WAVELENGTHS_UM = (0.4861327, 0.5875618, 0.6562725)
 _GEOMETRIES = ("Plane", "StandardGeometry", "EvenAsphere", "BiconicGeometry")
@@ -55,12 +54,10 @@ def read_optiland(path: str | Path) -> RawSequence:
         When the file cannot be read or is not supported; `problems` gives each surface by its number, the object is 0.
     """
     problems: list[str] = []
-    try:
+    with lens_errors():
         data = read_json(path, "a lens of Optiland", foreign=True)
         with sentences_for(path, "a lens of Optiland"):
             raw = _sequence(Path(path), data, problems)
-    except FileError as error:
-        raise LensError(str(error), (str(error),)) from error
     if raw is None or problems:
         raise LensError(summary(str(path), problems), tuple(problems))
     return raw
@@ -69,7 +66,7 @@ def read_optiland(path: str | Path) -> RawSequence:
 def _sequence(path: Path, data: Any, problems: list[str]) -> RawSequence | None:
     group = data.get("surface_group") if isinstance(data, dict) else None
     surfaces = group.get("surfaces") if isinstance(group, dict) else None
-    if not isinstance(surfaces, list) or not 4 <= len(surfaces) <= _MOST_SURFACES:
+    if not isinstance(surfaces, list) or not 4 <= len(surfaces) <= MOST_SURFACES:
         problems.append("it has no surfaces of object, lens and image (surface_group): is it a lens of Optiland?")
         return None
     if not all(isinstance(entry, dict) and isinstance(entry.get("geometry"), dict) for entry in surfaces):
@@ -77,7 +74,7 @@ def _sequence(path: Path, data: Any, problems: list[str]) -> RawSequence | None:
         return None
     findings: _Findings = []
     remarks: list[str] = []
-    places = [_number(_part(entry["geometry"], "cs").get("z")) for entry in surfaces]
+    places = [json_number(_part(entry["geometry"], "cs").get("z")) for entry in surfaces]
     if None in places[1:]:
         problems.append("a surface has no place (geometry, cs, z)")
         return None
@@ -100,7 +97,7 @@ def _sequence(path: Path, data: Any, problems: list[str]) -> RawSequence | None:
     return RawSequence(
         file=shown(path.name), name=name or shown(path.stem), rows=kept,
         stop_semi_diameter=next((row.surface.semi_diameter for row in kept if row.stop), None),
-        focus_distance=distance if 0.0 < distance < _INFINITE else None, **opening, **_field(_part(data, "fields")),
+        focus_distance=distance if 0.0 < distance < INFINITE else None, **opening, **_field(_part(data, "fields")),
         remarks=(*remarks, *found, *media.remarks(findings, "surface")),
     )  # fmt: skip
 
@@ -129,7 +126,7 @@ def _row(
     aperture = entry.get("aperture")
     rim = None
     if isinstance(aperture, dict):
-        rim = _number(aperture.get("r_max")) if aperture.get("type") == "RadialAperture" else None
+        rim = json_number(aperture.get("r_max")) if aperture.get("type") == "RadialAperture" else None
         if rim is None or aperture.get("r_min"):
             remarks.append(f"{where}: an aperture that is not round or annular is simplified")
     if len(problems) > before:
@@ -144,7 +141,7 @@ def _row(
 
 def _gap(entry: Mapping[str, Any], distance: float) -> float:
     """Return the thickness that the file states if it agrees with the places, which rounding changes."""
-    stated = _number(entry.get("thickness"))
+    stated = json_number(entry.get("thickness"))
     return stated if stated is not None and abs(stated - distance) < _ROUNDED else distance
 
 
@@ -162,7 +159,7 @@ def _shape(where: str, kind: str, geometry: Mapping[str, Any], problems: list[st
         return found
 
     def conic(key: str) -> float:
-        value = _number(geometry.get(key, 0.0))
+        value = json_number(geometry.get(key, 0.0))
         if value is None:
             problems.append(f"{where}: {key} is {shorten(geometry[key])}, a number was expected")
         return value or 0.0
@@ -175,7 +172,7 @@ def _shape(where: str, kind: str, geometry: Mapping[str, Any], problems: list[st
     values: dict[str, Any] = {"curvature": curvature("radius"), "conic": conic("conic")}
     if kind == "EvenAsphere":
         terms = geometry.get("coefficients", [])
-        numbers = [_number(value) for value in terms] if isinstance(terms, list) else [None]
+        numbers = [json_number(value) for value in terms] if isinstance(terms, list) else [None]
         if None in numbers or len(numbers) > MOST_TERMS + 1 or any(numbers[:1]):
             problems.append(
                 f"{where}: its coefficients must be numbers of r^2, which must be 0, to r^{2 * MOST_TERMS + 2}"
@@ -188,7 +185,7 @@ def _medium(k: int, material: Mapping[str, Any], problems: list[str], findings: 
     kind, where = material.get("type"), f"surface {k}"
     if kind == "Material" and isinstance(material.get("name"), str):
         return numbered_medium(material["name"], None, None, where, problems, findings, k)
-    index, abbe = _number(material.get("index")), _number(material.get("abbe"))
+    index, abbe = json_number(material.get("index")), json_number(material.get("abbe"))
     if kind in ("AbbeMaterial", "IdealMaterial") and index is not None:
         return numbered_medium(None, index, abbe if kind == "AbbeMaterial" else None, where, problems, findings, k)
     problems.append(f"{where}: its material {shorten(kind)} has no name and no index at 587.56 nm")
@@ -197,7 +194,7 @@ def _medium(k: int, material: Mapping[str, Any], problems: list[str], findings: 
 
 def _opening(aperture: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
     names = {"imageFNO": "f_number", "EPD": "entrance_pupil_diameter"}
-    kind, value = aperture.get("type"), _number(aperture.get("value"))
+    kind, value = aperture.get("type"), json_number(aperture.get("value"))
     name = names.get(str(kind))
     if name is not None and value is not None and value > 0.0:
         return {name: value}, []
@@ -209,21 +206,14 @@ def _field(fields: Mapping[str, Any]) -> dict[str, float]:
     entries = fields.get("fields")
     if _part(fields, "field_definition").get("field_type") != "AngleField" or not isinstance(entries, list):
         return {}
-    pairs = [(_number(one.get("x")), _number(one.get("y"))) for one in entries if isinstance(one, dict)]
-    largest = max((math.hypot(x or 0.0, y or 0.0) for x, y in pairs), default=0.0)
+    points = [one for one in entries if isinstance(one, dict)]
+    largest = largest_field(*([json_number(one.get(axis)) for one in points] for axis in "xy"))
     return {"field_deg": largest} if 0.0 < largest < 90.0 else {}
 
 
 def _part(data: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     value = data.get(key)
     return value if isinstance(value, dict) else {}
-
-
-def _number(value: object) -> float | None:
-    """Return a finite number; None for anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e300:
-        return None
-    return float(value)
 
 
 def optiland_text(lens: Lens, sensor_distance: float, stop_semi_diameter: float) -> str:

@@ -18,15 +18,14 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from flarewright.errors import FileError, LensError
 from flarewright.model.lens.prescription import MOST_TERMS
 from flarewright.model.lens.raw_lens import RawSequence
 
-from ..files.door import sentences_for
-from ..files.sentences import did_you_mean, shorten
-from ..files.text_file import read_bytes
+from ...files.door import sentences_for
+from ...files.sentences import did_you_mean, shorten
+from ...files.text_file import read_bytes
+from ..foreign_file import decoded, lens_errors, number_of
 from .table_rows import TableHead, TableRow, sequence_of
-from .zemax_text import decoded, number_of
 
 _ALIASES = {
     "radius": ("radius", "r", "roc", "radiusmm"), "curvature": ("curvature", "c", "cv"),
@@ -131,10 +130,8 @@ def read_dat(path: str | Path) -> RawSequence:
 
 
 def _lines(path: str | Path, what: str) -> list[str]:
-    try:
+    with lens_errors():
         return decoded(read_bytes(path, what)).splitlines()
-    except FileError as error:
-        raise LensError(str(error), (str(error),)) from error
 
 
 def _state(key: str, value: str, head: TableHead) -> None:

@@ -13,9 +13,10 @@ import math
 
 from flarewright.model.lens.raw_lens import Configuration
 
-from ..files.sentences import shorten
-from .zemax_keywords import IDLE_OPERANDS, RIM_OPERANDS
-from .zemax_text import Operand, Text, number_of
+from ...files.sentences import shorten
+from ..foreign_file import number_of
+from .keywords import IDLE_OPERANDS, RIM_OPERANDS
+from .text import Operand, Text
 
 _READ = frozenset({"THIC", "APER", "XFIE", "YFIE"})
 # more are no settings of a lens

@@ -8,9 +8,9 @@ from typer.testing import CliRunner
 
 from flarewright.cli.app import app
 from flarewright.errors import LensError
+from flarewright.io.lens.foreign_file import decoded
 from flarewright.io.lens.lens_writer import write_lens
 from flarewright.io.lens.toml_lens import read_lens
-from flarewright.io.lens.zemax import decoded
 from flarewright.model import Stop, Surface
 from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.surface_shape import sag

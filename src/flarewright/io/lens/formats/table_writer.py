@@ -11,7 +11,7 @@ import io
 from flarewright.errors import LensError
 from flarewright.model import Lens, Stop, Surface
 
-from .lens_writer import shortest_radius
+from ..lens_writer import shortest_radius
 
 
 def csv_text(lens: Lens, sensor_distance: float, stop_semi_diameter: float) -> str:

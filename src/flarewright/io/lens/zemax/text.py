@@ -1,14 +1,14 @@
-"""The lines of a `.zmx` file, grouped by surface; `zemax` reads the result."""
+"""The lines of a `.zmx` file, grouped by surface; `reader` reads the result."""
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass, field
 
-from ..files.sentences import count, shorten
-from .glass_catalogue import MAKERS
-from .zemax_keywords import TEXTS, USED_OF_SURFACE
+from ...files.sentences import count, shorten
+from ..foreign_file import number_of
+from ..glass_catalogue import MAKERS
+from .keywords import TEXTS, USED_OF_SURFACE
 
 # the surface types have up to 250 parameters
 _MOST_PARAMETERS = 500
@@ -58,19 +58,6 @@ class Text:
         """Makers whose catalogues the file names, in its order; others (MISC, INFRARED) are left out."""
         words = self.head.get("GCAT", [])
         return tuple(dict.fromkeys(maker for word in words for maker in MAKERS if maker in word.upper()))
-
-
-def decoded(data: bytes) -> str:
-    """Decode UTF-16 or UTF-8, else the Windows code page of old versions."""
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return data.decode("utf-16", errors="replace")
-    if b"\x00" in data[:64]:
-        # without a byte order mark: in UTF-16, every other byte of Latin letters is 0
-        return data.decode("utf-16-le" if data[1:2] == b"\x00" else "utf-16-be", errors="replace")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("cp1252", errors="replace")
 
 
 def grouped(text: str) -> Text:
@@ -132,12 +119,3 @@ def _of_surface(block: Block, key: str, words: list[str], found: Text) -> None:
         found.problems.append(f"{where}: {shorten(' '.join([key, *words]))} is not understood")
         return
     (block.parameters if key == "PARM" else block.extra)[number] = value
-
-
-def number_of(word: str) -> float | None:
-    """Return a finite number, or None."""
-    try:
-        value = float(word)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None

@@ -9,7 +9,7 @@ import pytest
 
 from flarewright.cli.app import run
 from flarewright.errors import LensError
-from flarewright.io.lens.dotlens import read_dotlens
+from flarewright.io.lens.formats.dotlens import read_dotlens
 from flarewright.io.lens.lens_writer import write_lens
 from flarewright.io.lens.toml_lens import read_lens
 from flarewright.model import Lens, QuarterWave, Stop
@@ -18,7 +18,7 @@ from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens_import.patent_repair import repair
 from flarewright.render.scene.resolve import load_lens
 
-CORPUS = Path(os.environ.get("FLAREWRIGHT_CORPUS", Path(__file__).parents[4] / "shared" / "lens_corpus"))
+CORPUS = Path(os.environ.get("FLAREWRIGHT_CORPUS", Path(__file__).parents[5] / "shared" / "lens_corpus"))
 FILES = sorted(CORPUS.glob("*.lens")) if CORPUS.is_dir() else []
 needs_corpus = pytest.mark.skipif(not FILES, reason=f"no .lens files in {CORPUS} (set FLAREWRIGHT_CORPUS)")
 

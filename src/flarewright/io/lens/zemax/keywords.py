@@ -1,6 +1,6 @@
 """Keywords of `.zmx` files: those that the reader uses, and those without effect on a ghost.
 
-`zemax` names every other keyword in a remark; `zemax_configurations` reads the rows of the table of configurations.
+`reader` names every other keyword in a remark; `configurations` reads the rows of the table of configurations.
 Source: the files of makers and vendors, and the OpticStudio help.
 """
 
@@ -21,7 +21,7 @@ HARMLESS = frozenset({
     # version, display, ray aiming, sampling and weights of its analyses, settings of non-sequential parts, stock number
     "VERS", "PFIL", "LANG", "PICB", "SDMA", "OMMA", "HYPR", "ROPD", "RAIM", "FWGN", "FWGT", "WWGT", "WWGN", "POLS",
     "GLRS", "GSTD", "NSCD", "COFN", "GFAC", "DBDT", "PUSH",
-    # tolerances, and rows of the table of configurations, which `zemax_configurations` reads
+    # tolerances, and rows of the table of configurations, which `configurations` reads
     "TOL", "MOFF", "BLNK", "SDIA", "THIC", "CRVT", "CONN", "PRAM", "YFIE", "XFIE", "STPS", "APER", "MCOM",
     *VIGNETTING,
 })  # fmt: skip

@@ -1,7 +1,7 @@
-"""Write a lens as a sequential Zemax file (`.zmx`) that `zemax.read_zmx` reads back.
+"""Write a lens as a sequential Zemax file (`.zmx`) that `reader.read_zmx` reads back.
 
 Surfaces are of the types STANDARD, EVENASPH and BICONICX, positions become configurations (THIC, APER, YFIE). A glass
-is named where the catalogue has the row's index, else it is written by its n_d and V_d. Source: as for `zemax`.
+is named where the catalogue has the row's index, else it is written by its n_d and V_d. Source: as for `reader`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NamedTuple
 from flarewright.errors import GlassError, LensError
 from flarewright.model import Lens, Medium, Stop, Surface
 
-from . import glass_catalogue
+from .. import glass_catalogue
 
 # F, d and C line
 _WAVELENGTHS_UM = (0.4861327, 0.5875618, 0.6562725)

@@ -11,7 +11,6 @@ Source: the sequence files that lens vendors publish, and the command names of t
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,23 +18,21 @@ from typing import Literal
 
 from pydantic import ValidationError
 
-from flarewright.errors import FileError, LensError
+from flarewright.errors import LensError
 from flarewright.model import Medium, Surface
 from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
 
-from ..files.door import sentences_for, shown
-from ..files.sentences import shorten, summary, validation_sentences
-from ..files.text_file import read_bytes
-from . import media
-from .lens_fields import CURVATURE
-from .medium_names import named_medium, numbered_medium
-from .zemax_text import decoded, number_of
+from ...files.door import sentences_for, shown
+from ...files.sentences import shorten, summary, validation_sentences
+from ...files.text_file import read_bytes
+from .. import media
+from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_errors, number_of
+from ..lens_fields import CURVATURE
+from ..medium_names import named_medium, numbered_medium
 
 FirstColumn = Literal["radii", "curvatures"]
 
 _MM = {"M": 1.0, "MM": 1.0, "C": 10.0, "CM": 10.0, "I": 25.4, "IN": 25.4}
-_MOST_SURFACES = 500
-_INFINITE = 1e9
 # A to H are terms of r^4 to r^18, J is that of r^20
 _TERMS = {letter: k for k, letter in enumerate("ABCDEFGHJ")}
 _FIELDS = ("XAN", "YAN", "XIM", "YIM", "XRI", "YRI", "XOB", "YOB")
@@ -105,14 +102,12 @@ def read_seq(path: str | Path, first_column: FirstColumn | None = None) -> RawSe
         When the file cannot be read or is not supported; `problems` gives each surface by its number, the object is 0.
     """
     reading = _Reading()
-    try:
+    with lens_errors():
         data = read_bytes(path, "a .seq file")
         with sentences_for(path, "a .seq file"):
             for words in _commands(decoded(data)):
                 _command(words, reading)
             raw = _sequence(Path(path), reading, first_column)
-    except FileError as error:
-        raise LensError(str(error), (str(error),)) from error
     if raw is None or reading.problems:
         raise LensError(summary(str(path), reading.problems), tuple(reading.problems))
     return raw
@@ -216,8 +211,8 @@ def _sequence(path: Path, reading: _Reading, first_column: FirstColumn | None) -
     surfaces, problems = reading.surfaces, reading.problems
     if len(surfaces) < 4:
         problems.append("the surfaces of object, lens and image (SO, S, SI) are missing: is it a CODE V .seq file?")
-    elif len(surfaces) > _MOST_SURFACES:
-        problems.append(f"it has {len(surfaces)} surfaces, a lens has at most {_MOST_SURFACES}")
+    elif len(surfaces) > MOST_SURFACES:
+        problems.append(f"it has {len(surfaces)} surfaces, a lens has at most {MOST_SURFACES}")
     radii = first_column == "radii" if reading.radii is None else reading.radii
     if reading.radii is None and first_column is None:
         problems.append(
@@ -258,7 +253,7 @@ def _row(surface: _Surface, mm: float, radii: bool, reading: _Reading) -> Sequen
     if first is None or thickness is None:
         problems.append(f"{where}: {shorten(' '.join(surface.words[:2]))} is no {_kind(radii)} and thickness")
         return None
-    if abs(thickness * mm) >= _INFINITE:
+    if abs(thickness * mm) >= INFINITE:
         problems.append(f"{where}: the gap to the next surface is infinite, so they form no lens: give its length")
     medium = None
     rest = surface.words[2:]
@@ -313,7 +308,7 @@ def _object_distance(surface: _Surface, mm: float, reading: _Reading) -> float |
         reading.problems.append(
             "surface 0: the lens stands in a medium: Flarewright traces light that comes through air"
         )
-    return None if value is None or not 0.0 < value * mm < _INFINITE else value * mm
+    return None if value is None or not 0.0 < value * mm < INFINITE else value * mm
 
 
 def _opening(reading: _Reading, mm: float) -> dict[str, float | None]:
@@ -327,16 +322,13 @@ def _opening(reading: _Reading, mm: float) -> dict[str, float | None]:
 
 def _field(reading: _Reading, mm: float) -> dict[str, float | None]:
     """Return the largest field as an angle or an image height."""
-    columns = {key: [number_of(word) or 0.0 for word in reading.head.get(key, [])] for key in _FIELDS}
+    columns = {key: [number_of(word) for word in reading.head.get(key, [])] for key in _FIELDS}
     for axes, name in (
         (("XAN", "YAN"), "field_deg"),
         (("XIM", "YIM"), "image_height"),
         (("XRI", "YRI"), "image_height"),
     ):
-        x, y = (columns[axis] for axis in axes)
-        count = max(len(x), len(y))
-        pairs = zip(x + [0.0] * (count - len(x)), y + [0.0] * (count - len(y)), strict=True)
-        largest = max((math.hypot(*pair) for pair in pairs), default=0.0)
+        largest = largest_field(*(columns[axis] for axis in axes))
         if largest > 0.0 and (name != "field_deg" or largest < 90.0):
             return {name: largest * (1.0 if name == "field_deg" else mm)}
     return {}

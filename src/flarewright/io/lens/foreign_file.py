@@ -1,0 +1,67 @@
+"""What the readers of other programs' lens files share: decoding, numbers, the largest field, errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from itertools import zip_longest
+
+from flarewright.errors import FileError, LensError
+
+MOST_SURFACES = 500
+"""Largest number of surfaces: photographic lenses have up to sixty; longer files are not lenses."""
+INFINITE = 1e9
+"""A gap of this length or more, in the unit of the file, is infinite."""
+
+
+@contextmanager
+def lens_errors() -> Iterator[None]:
+    """Raise the FileError of a file that cannot be read as a LensError, whose `problems` hold the sentence."""
+    try:
+        yield
+    except FileError as error:
+        raise LensError(str(error), (str(error),)) from error
+
+
+def decoded(data: bytes) -> str:
+    """Decode UTF-16 or UTF-8, else the Windows code page of old versions."""
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return data.decode("utf-16", errors="replace")
+    if b"\x00" in data[:64]:
+        # without a byte order mark: in UTF-16, every other byte of Latin letters is 0
+        return data.decode("utf-16-le" if data[1:2] == b"\x00" else "utf-16-be", errors="replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")
+
+
+def number_of(word: str) -> float | None:
+    """Return the finite number that a word states, or None."""
+    try:
+        value = float(word)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def json_number(value: object) -> float | None:
+    """Return a finite number of a JSON file; None for anything else, such as a whole number that no float can hold."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e300:
+        return None
+    return float(value)
+
+
+def largest_field(x: Sequence[float | None], y: Sequence[float | None]) -> float:
+    """Return the largest distance of the field points from the axis; 0 if there are none.
+
+    Parameters
+    ----------
+    x, y : sequence of float or None
+        Columns of a file, of any unit; a missing number is 0.
+    """
+    return max((math.hypot(a or 0.0, b or 0.0) for a, b in zip_longest(x, y)), default=0.0)
+
+
+__all__ = ["INFINITE", "MOST_SURFACES", "decoded", "json_number", "largest_field", "lens_errors", "number_of"]
