@@ -1,8 +1,10 @@
 """Setup of all tests: helper modules importable by name, and a cache of compiled kernels for the current sources."""
 
+import atexit
 import gc
 import hashlib
 import os
+import shutil
 import sys
 import tempfile
 from contextlib import contextmanager
@@ -25,6 +27,10 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(tempfile.gettempdir()) / f"fla
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # as on the command line: the imported modules live until the end
 gc.set_threshold(100_000)
+# the developer's own library of lenses is no part of a test
+if "FLAREWRIGHT_STATE" not in os.environ:
+    os.environ["FLAREWRIGHT_STATE"] = tempfile.mkdtemp(prefix="flarewright-tests-")
+    atexit.register(shutil.rmtree, os.environ["FLAREWRIGHT_STATE"], ignore_errors=True)
 # the test process compiles missing kernels itself, without helpers; tests/contracts tests the helpers (docs/adr/0007)
 os.environ.setdefault("FLAREWRIGHT_HELPER", "1")
 

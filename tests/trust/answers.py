@@ -72,6 +72,8 @@ def judged(arguments: Sequence[str], folder: Path, *, endless: bool = False, kee
     """
     here, old = Path.cwd(), set(folder.rglob("*"))
     out, err = io.StringIO(), io.StringIO()
+    state = os.environ.get("FLAREWRIGHT_STATE")
+    os.environ["FLAREWRIGHT_STATE"] = str(folder / "state")
     os.chdir(folder)
     try:
         with redirect_stdout(out), redirect_stderr(err), within(2.0 if endless else PATIENCE_S):
@@ -84,6 +86,7 @@ def judged(arguments: Sequence[str], folder: Path, *, endless: bool = False, kee
         return False, traceback.format_exc(limit=-3)
     finally:
         os.chdir(here)
+        os.environ.pop("FLAREWRIGHT_STATE") if state is None else os.environ.update(FLAREWRIGHT_STATE=state)
     written = [path for path in folder.rglob("*") if path not in old and path.is_file()]
     sentences = err.getvalue().splitlines()
     if "Traceback" in err.getvalue():

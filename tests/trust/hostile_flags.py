@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from contextlib import redirect_stderr
 from functools import cache
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 
@@ -107,7 +108,10 @@ def prepare(folder: Path) -> None:
     (folder / "captures.csv").write_text("\n".join(rows) + "\n", "utf-8")
     (folder / "camera.json").write_text('{"electrons_per_unit": 20000, "read_noise": 0.001}', "utf-8")
     merge = ("measure", "merge", "captures.csv", "-o", "merged", "--camera", "camera.json")
-    for words in (merge, ("design", "solve", "shot.toml", "-o", "searched", "--time", "0.2")):
+    with ZipFile(folder / "lens.zip", "w") as archive:
+        archive.write(folder / "lens.toml", "tessar/lens.toml")
+    library = ("library", "add", "lens.toml", "--name", "mine")
+    for words in (merge, library, ("design", "solve", "shot.toml", "-o", "searched", "--time", "0.2")):
         held, answer = judged(words, folder, keep=True)
         assert (held, answer) == (True, "done")
 

@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 import flarewright
+from flarewright.io.lens.library import lens_path, library_names
 from flarewright.io.measurement.ghost_model_file import write_ghost_model
 from flarewright.measure.core.parameter_vector import NUMBERS, channel_of
 from flarewright.model.measurement.ghost_model import AberrationGhost, GhostModel
@@ -120,6 +121,13 @@ def _model(folder: Path) -> None:
     write_ghost_model(folder / "model.json", model)
 
 
+def _lenses(folder: Path) -> None:
+    """Write shipped lenses as a user's files."""
+    (folder / "lenses").mkdir()
+    for name in library_names()[:8]:
+        shutil.copy(lens_path(name), folder / "lenses" / f"my-{name}.toml")
+
+
 @cache
 def _photographs() -> Path:
     """Photograph a lens once for all runs."""
@@ -213,6 +221,11 @@ TRIALS = {
     "shot": Trial(
         ("shot", "--project", "moving.toml", "--processes", "2", "-o", "out.####.exr"), ("out.*.exr",),
         prepare=lambda folder: (folder / "moving.toml").write_text(MOVING) and None,
+    ),
+    "library add": Trial(("library", "add", "lenses"), ("state/library/lenses/*",), prepare=_lenses),
+    "library thumbnails": Trial(
+        ("library", "thumbnails"), ("state/library/thumbnails/*.jpg",),
+        prepare=lambda folder: (_lenses(folder), _run(folder, ("library", "add", "lenses")), None)[-1],
     ),
     "gallery": Trial(("gallery", "-o", "out", "--size", "32x18"), ("out/*.png", "out/index.html")),
     "warm-up": Trial(("warm-up",), ("cache/*/*.nbi",)),

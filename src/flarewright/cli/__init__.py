@@ -8,7 +8,7 @@ has its own threads, and idle library threads would spin: a fifth of a core whil
 - `option_record`: `with_options`, commands whose options are the fields of a record
 - `option_words`: placeholders of option values in help texts
 - `edit`, `gallery`, `looks`, `warm_up`: single commands
-- `design`, `lens`, `measure`, `predict`, `project`, `render`: groups of commands
+- `design`, `lens`, `library`, `measure`, `predict`, `project`, `render`: groups of commands
 """
 
 import os

@@ -28,6 +28,12 @@ from .lens import coating_list, coating_plot, lenses
 from .lens import convert as lens_convert
 from .lens import schema as lens_schema
 from .lens import show as lens_show
+from .library import add as library_add
+from .library import listing as library_list
+from .library import remove as library_remove
+from .library import search as library_search
+from .library import show as library_show
+from .library import thumbnails as library_thumbnails
 from .measure import explain as measure_explain
 from .measure import replay as measure_replay
 from .measure import report as measure_report
@@ -60,6 +66,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 lens_app = typer.Typer(help="Show, check and convert lens files.")
+library_app = typer.Typer(help="Your own library of lenses: add files, search, use them by name.")
 looks_app = typer.Typer(help="Looks: coatings, iris, dirt and colours together, for any lens and light.")
 coating_app = typer.Typer(help="List standard coatings, and plot the reflectance of any coating.")
 project_app = typer.Typer(help="Project files: everything a render needs, in one TOML file.")
@@ -76,6 +83,7 @@ app.command("gallery", epilog=gallery.EPILOG)(gallery.gallery)
 app.command("edit", epilog=edit.EPILOG)(edit.edit)
 app.command("warm-up", epilog=warm_up.EPILOG)(warm_up.warm_up)
 app.add_typer(lens_app, name="lens")
+app.add_typer(library_app, name="library")
 app.add_typer(looks_app, name="looks")
 looks_app.callback(invoke_without_command=True, epilog=looks.EPILOG)(looks.looks)
 looks_app.command("save", epilog=looks.SAVE_EPILOG)(looks.save)
@@ -88,6 +96,12 @@ lens_app.command("show", epilog=lens_show.EPILOG)(lens_show.show)
 lens_app.command("check", epilog=lens_check.EPILOG)(lens_check.check)
 lens_app.command("convert", epilog=lens_convert.EPILOG)(lens_convert.convert)
 lens_app.command("schema")(lens_schema.schema)
+library_app.command("add", epilog=library_add.EPILOG)(library_add.add)
+library_app.command("list", epilog=library_list.EPILOG)(library_list.listing)
+library_app.command("search", epilog=library_search.EPILOG)(library_search.search)
+library_app.command("show", epilog=library_show.EPILOG)(library_show.show)
+library_app.command("remove", epilog=library_remove.EPILOG)(library_remove.remove)
+library_app.command("thumbnails", epilog=library_thumbnails.EPILOG)(library_thumbnails.thumbnails)
 coating_app.command("list", epilog=coating_list.EPILOG)(coating_list.listing)
 coating_app.command("plot", epilog=coating_plot.EPILOG)(coating_plot.plot)
 project_app.command("init", epilog=project_init.EPILOG)(project_init.init)
@@ -162,7 +176,7 @@ def run(arguments: Sequence[str]) -> int:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     words = list(arguments)
-    if words in ([], ["lens"], ["coating"], ["project"], ["scene"], ["design"], ["measure"]):
+    if words in ([], ["lens"], ["library"], ["coating"], ["project"], ["scene"], ["design"], ["measure"]):
         if not words:
             _show_gallery()
         words.append("--help")

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..io.lens.formats.codev import FirstColumn
+    from ..io.lens.own.record import LensRecord
     from ..optics.lens_import.patent_repair import Apertures
     from ..typing import Progress
 
@@ -192,6 +193,12 @@ def console() -> Console:
     from rich.console import Console
 
     return Console(markup=False, highlight=False, width=None if sys.stdout.isatty() else 140)
+
+
+def focal_text(record: LensRecord) -> str:
+    """Return the focal length of a lens, or the range of a zoom, in mm."""
+    low, high = record.efl_range_mm
+    return f"{low:.1f}-{high:.1f}" if high > 1.001 * low else f"{record.efl_mm:.1f}"
 
 
 def chosen_fstop(f_number: float | None) -> float | None:

@@ -48,7 +48,7 @@ class Card:
 
 def cards() -> tuple[Card, ...]:
     """Return the pictures of the library: lenses, then looks, each sorted by name."""
-    return (*(_lens_card(name) for name in library_names()), *(_look_card(name) for name in shipped_looks()))
+    return (*(lens_card(name) for name in library_names()), *(_look_card(name) for name in shipped_looks()))
 
 
 def card_project(card: Card, size_px: tuple[int, int]) -> Project:
@@ -101,7 +101,8 @@ def card_picture(card: Card, size_px: tuple[int, int]) -> NDArray[np.uint8]:
     return view(drawn.layers[0].pixels, layers_exposure(drawn.layers))
 
 
-def _lens_card(name: str) -> Card:
+def lens_card(name: str) -> Card:
+    """Return the picture of a lens by its name."""
     lens = open_lens(name).lens
     x, y = light_place(name)
     wide = " --desqueeze" if lens.squeeze is not None else ""

@@ -55,6 +55,8 @@ JOBS = (
     LongJob(("render",), "NAME.partial, NAME.state.npz", "the same command, or --resume NAME.state.npz"),
     LongJob(("shot",), "the finished frames"),
     LongJob(("gallery",), "DIR/gallery.json"),
+    LongJob(("library", "add"), "the library"),
+    LongJob(("library", "thumbnails"), "the library"),
     LongJob(("warm-up",), "the cache of compiled kernels"),
 )
 """Every command that can run longer than a minute; `render` has a second file at reference quality."""

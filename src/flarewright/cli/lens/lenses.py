@@ -1,4 +1,4 @@
-"""`flarewright lenses`: the shipped lenses."""
+"""`flarewright lenses`: the shipped lenses, and those of the user's library."""
 
 from __future__ import annotations
 
@@ -6,17 +6,19 @@ from typing import Annotated, Any
 
 import typer
 
-from ..common import console, print_json
+from ..common import console, focal_text, print_json, print_remarks
 
 EPILOG = "Show one with: flarewright lens show heliar-tronnier --plot heliar.svg"
 
 
 def lenses(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False) -> None:
-    """List the shipped lenses with focal length, f-number, field and source."""
+    """List the shipped lenses, then those of your library, with focal length, f-number, field and source."""
     from ...io.lens.library import lens_path, library_names
+    from ...io.lens.own.record import as_json as record_json
     from ...io.lens.toml_lens import read_lens_toml
     from ...optics.rays.pack import preset_names
     from ...render.scene.resolve import first_order
+    from ...workflow.own_lenses import own_library
 
     found: list[dict[str, Any]] = []
     for name in library_names():
@@ -34,8 +36,10 @@ def lenses(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON 
                 "source": lens.source,
             }
         )
+    library = own_library()
+    print_remarks(library.remarks)
     if as_json:
-        print_json({"lenses": found})
+        print_json({"lenses": found, "own_lenses": [record_json(record) for record in library.records]})
         return
     from rich.table import Table
 
@@ -53,5 +57,16 @@ def lenses(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON 
             field,
             str(lens_row["surfaces"]),
             lens_row["source"],
+        )
+    if library.records:
+        out.add_section()
+    for record in library.records:
+        out.add_row(
+            record.name,
+            focal_text(record),
+            f"{record.f_number:.3g}",
+            "-" if record.field_deg is None else f"{record.field_deg:.1f}",
+            str(record.surfaces),
+            record.patent or record.title,
         )
     console().print(out)

@@ -48,16 +48,15 @@ def init(
 
 def _of_lens(lens: str, light: Light) -> tuple[Project, tuple[str, ...]]:
     """Return a project with a lens, and remarks on the lens."""
-    from ...io.lens.library import library_names
+    from ...io.lens.library import library_name
     from ...model import Project
     from ...render.scene.resolve import open_lens
 
     opened = open_lens(lens)
     found = opened.path
     assert found is not None
-    # A shipped lens keeps its name; a file gets a path relative to the project's folder.
-    ships = found.stem in library_names() and not Path(lens).exists()
-    name = found.stem if ships else os.fspath(found)
+    # A lens of a library keeps its name; a file gets a path relative to the project's folder.
+    name = library_name(lens) or os.fspath(found)
     return Project(lens=name, lights=(light,), iris=opened.lens.iris), opened.remarks
 
 

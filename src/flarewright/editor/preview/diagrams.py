@@ -15,6 +15,7 @@ from ...errors import FlarewrightError, ProjectError
 from ...io.images.mask_image import read_mask
 from ...io.lens.coating_text import format_coating
 from ...io.lens.library import library_names
+from ...io.lens.own.folder import key_of
 from ...io.project.look_file import read_look, shipped_looks
 from ...model import Coating, Project, Surface
 from ...model.project.design import Bounds
@@ -25,6 +26,7 @@ from ...render.plots.coating_plot import PANEL, PLOT_ANGLES_DEG, STRIP_ANGLES_DE
 from ...render.plots.cross_section import cross_section
 from ...render.plots.svg import to_svg
 from ...render.scene.resolve import open_lens, resolve_project
+from ...workflow.own_lenses import own_library
 from .display_image import png
 
 
@@ -134,9 +136,22 @@ def ghost_places(project: Project) -> list[dict[str, object]]:
     ]  # fmt: skip
 
 
-@lru_cache(maxsize=1)
 def library() -> tuple[dict[str, object], ...]:
-    """Return the shipped lenses: name, title, patent, and words to search."""
+    """Return the user's lenses, then the shipped ones: name, title, patent, and words to search."""
+    # a shipped lens hides one of the user that has its name
+    shipped = {key_of(name) for name in library_names()}
+    own = tuple(
+        {
+            "name": one.name, "title": one.title, "source": one.source or one.file, "f_number": round(one.f_number, 2),
+            "rows": one.surfaces + 1, "words": one.words, "own": True,
+        }
+        for one in own_library().records if key_of(one.name) not in shipped
+    )  # fmt: skip
+    return (*own, *_shipped_lenses())
+
+
+@lru_cache(maxsize=1)
+def _shipped_lenses() -> tuple[dict[str, object], ...]:
     out = []
     for name in library_names():
         try:
@@ -147,6 +162,7 @@ def library() -> tuple[dict[str, object], ...]:
             {
                 "name": name, "title": lens.name, "source": lens.source, "f_number": lens.f_number,
                 "rows": len(lens.rows), "words": f"{name} {lens.name} {lens.source} f/{lens.f_number:g}".lower(),
+                "own": False,
             }
         )  # fmt: skip
     return tuple(out)

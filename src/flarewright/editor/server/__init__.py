@@ -5,6 +5,7 @@ Public entry points: `app.serve`, `app.make_app`, `workspace.Workspace`.
 - `app`: routes, request handlers, and `serve`
 - `workspace`: `Workspace` joins session, screen, solver and browser tabs
 - `access`: `Access`, and `Guard`, which checks origin and token of requests
+- `thumbnails`: `ThumbnailMaker` renders thumbnails of the user's lenses in a child process
 - `tokens`: the token: chosen, or random and kept
 - `turns`: `Turns` runs the work of requests on a few threads, with a bounded queue
 - `messages`: JSON objects of requests and sockets, of bounded depth

@@ -31,7 +31,9 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from ...errors import FlarewrightError, ProjectError
 from ...io.images.thumbnails import thumbnail
+from ...io.lens.library import is_own
 from ...model import Project
+from ...workflow.own_thumbnails import read_thumbnail
 from ..commands.light_path import go_to
 from ..commands.shot import move_light
 from ..preview import diagrams, queries
@@ -316,8 +318,15 @@ def _library(_workspace: Workspace, _request: Request, _body: Any) -> Any:
     return {"lenses": list(diagrams.library()), "looks": list(diagrams.looks())}
 
 
-def _thumbnail(_workspace: Workspace, request: Request, _body: Any) -> Any:
-    return _jpeg(thumbnail(request.path_params["kind"], request.path_params["name"]))
+def _thumbnail(workspace: Workspace, request: Request, _body: Any) -> Any:
+    kind, name = request.path_params["kind"], request.path_params["name"]
+    if kind != "lens" or not is_own(name):
+        return _jpeg(thumbnail(kind, name))
+    if (data := read_thumbnail(name)) is not None:
+        return _jpeg(data)
+    # the page asks again
+    workspace.thumbnails.ask()
+    return Response(status_code=204, headers=_FRESH)
 
 
 def _glasses(_workspace: Workspace, request: Request, _body: Any) -> Any:

@@ -19,6 +19,7 @@ from ..preview.viewport import Screen
 from ..session.session import Session
 from .messages import object_of
 from .page_state import picture_of, solve_of, state_of
+from .thumbnails import ThumbnailMaker
 from .turns import Crowded, Turns
 
 # largest number of sockets of one kind: tabs, and drags
@@ -68,6 +69,7 @@ class Workspace:
         self.following = 0
         # threads for what pages ask, for changes, and for drags: none waits for the others
         self.questions, self.changes, self.drags = Turns(4, 64), Turns(8, 256), Turns(4, 128)
+        self.thumbnails = ThumbnailMaker()
         # folders of exported files that are drawn or sent
         self.exports: set[Path] = set()
         self._tabs: set[Tab] = set()
@@ -121,6 +123,7 @@ class Workspace:
         """Ask drawing, searching and exporting to end soon."""
         self.solver.close()
         self.screen.close()
+        self.thumbnails.close()
         for turns in (self.questions, self.changes, self.drags):
             turns.end()
 

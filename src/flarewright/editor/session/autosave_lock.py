@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import errno
 import os
-import sys
 from pathlib import Path
 from typing import IO, Any
 
 from ...errors import FlarewrightError
+from ...io.files.file_lock import held
 from ...io.files.state_folder import state_folder
 from ...typing import Report
 from ..common.latest_job import Lane
 from .autosave import Saved, autosave_path, write_autosave
 
-# errors of a file system that knows no locks
-_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 # largest number of editors of one project at the same time
 MOST = 20
 # time limit of the last autosave, seconds
@@ -60,6 +57,8 @@ class AutosaveWriter:
 def claim(what: str | None) -> AutosaveWriter:
     """Lock the first autosave of a project that no other editor holds.
 
+    A file system without locks lets every editor have it: else each start would get another autosave, and resume none.
+
     Parameters
     ----------
     what : str or None
@@ -76,7 +75,7 @@ def claim(what: str | None) -> AutosaveWriter:
         except OSError:
             # the folder cannot be written; the first write reports it
             return AutosaveWriter(path)
-        if _held(lock):
+        if held(lock):
             return AutosaveWriter(path, lock, number)
         lock.close()
     return AutosaveWriter(autosave_path(what, os.getpid()))
@@ -95,7 +94,7 @@ def claim_last() -> AutosaveWriter | None:
         lock = _opened(last)
     except (OSError, ValueError):
         return None
-    if _held(lock):
+    if held(lock):
         return AutosaveWriter(last, lock)
     lock.close()
     return None
@@ -105,23 +104,3 @@ def _opened(path: Path) -> IO[Any]:
     """Open the lock file of an autosave."""
     path.parent.mkdir(parents=True, exist_ok=True)
     return path.with_suffix(".lock").open("a+b")
-
-
-def _held(file: IO[Any]) -> bool:
-    """Lock a file for this process while it is open; return False if another process holds it.
-
-    The system releases the lock when the process ends for any reason. A file system without locks lets every editor
-    have it: else each start would get another autosave, and resume none.
-    """
-    try:
-        if sys.platform == "win32":
-            import msvcrt
-
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        else:
-            import fcntl
-
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        return error.errno in _NO_LOCKS
-    return True

@@ -18,7 +18,7 @@ from ...io.files.text_file import read_toml
 from ...io.images.exr import write_exr
 from ...io.images.half import exr_scale
 from ...io.lens.lens_writer import format_lens
-from ...io.lens.library import lens_path, library_names, near_names
+from ...io.lens.library import lens_path, library_name, near_names
 from ...io.measurement.ghost_model_file import is_ghost_model_file
 from ...io.project.look_file import look_text, read_look
 from ...io.project.project_file import project_from_data, project_text, read_project
@@ -104,9 +104,8 @@ def open_any(text: str, allowed: Callable[[Project], None] = _any_project) -> tu
         return with_sensor(project) if is_measured(project) else project, str(path.resolve())
     if is_ghost_model_file(str(path)):
         return project_for_measured(str(path.resolve())), None
-    found = lens_path(text)
-    name = found.stem if found.stem in library_names() and not path.exists() else str(path.resolve())
-    return project_for_lens(name), None
+    lens_path(text)
+    return project_for_lens(library_name(text) or str(path.resolve())), None
 
 
 def opened(text: str, allowed: Callable[[Project], None] = _any_project) -> tuple[Project, str | None]:

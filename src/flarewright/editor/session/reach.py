@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...errors import FlarewrightError, ProjectError
-from ...io.lens.library import lens_path, library_names, near_names
+from ...io.lens.library import library_name, near_names
 from ...io.project.named_files import picture_files
 from ...measure.replay.measured_project import is_measured
 from ...model import Project
@@ -60,7 +60,7 @@ class Reach:
         ProjectError
             As `check`; whether a file exists is not reported.
         """
-        if _shipped(text):
+        if _named(text):
             return
         try:
             self.check(text)
@@ -108,12 +108,12 @@ def reach_of(roots: Iterable[Path], history: History) -> Reach:
 
 def files_of(project: Project) -> tuple[str, ...]:
     """Return the paths of all files that a project reads: its lens or measured flare, and pictures."""
-    lens = (project.lens,) if isinstance(project.lens, str) and not _shipped(project.lens) else ()
+    lens = (project.lens,) if isinstance(project.lens, str) and not _named(project.lens) else ()
     return (*lens, *picture_files(project))
 
 
-def _shipped(text: str) -> bool:
+def _named(text: str) -> bool:
     try:
-        return lens_path(text).stem in library_names() and not Path(text).exists()
+        return library_name(text) is not None
     except (FlarewrightError, OSError, ValueError, RuntimeError):
         return False

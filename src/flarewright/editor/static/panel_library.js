@@ -1,4 +1,4 @@
-// The shipped lenses and looks, each with a picture.
+// The user's lenses, the shipped lenses and the looks, each with a picture.
 import { get } from './api.js';
 import { h } from './ui.js';
 
@@ -13,19 +13,26 @@ export function libraryPanel(app) {
   box.addEventListener('input', draw);
   async function choose(name) { try { await app.command('choose_lens', { lens: name }); } catch (error) { void error; } }
   async function wear(name) { try { await app.command('put_look', { name }); } catch (error) { void error; } }
-  const picture = (kind, name) => h('img', { alt: '', src: `api/thumbnail/${kind}/${name}`, loading: 'lazy' });
+  function picture(kind, name, own = false) {
+    const address = `api/thumbnail/${kind}/${encodeURIComponent(name)}`;
+    const image = h('img', { alt: '', src: address, loading: 'lazy' });
+    let tries = 0;
+    // pictures of the user's lenses are rendered in the background; ask again, ever less often, while they are shown
+    if (own) image.addEventListener('error', () => { tries += 1; setTimeout(() => { if (image.isConnected) image.src = `${address}?again=${tries}`; }, Math.min(3000 * tries, 30000)); });
+    return image;
+  }
   function draw() {
     if (!lenses) return;
     const words = box.value.toLowerCase().split(/\s+/).filter(Boolean);
     const matching = (all) => all.filter((one) => words.every((word) => one.words.includes(word)));
-    lensGrid.replaceChildren(...matching(lenses).map((lens) => h('button', { type: 'button', class: app.state?.lens.shipped === lens.name ? 'on' : '', 'data-lens': lens.name, onclick: () => choose(lens.name), tip: lens.source }, picture('lens', lens.name), h('span', {}, lens.title), h('small', {}, `f/${lens.f_number} · ${lens.rows - 1} surfaces`))));
+    lensGrid.replaceChildren(...matching(lenses).map((lens) => h('button', { type: 'button', class: app.state?.lens.shipped === lens.name ? 'on' : '', 'data-lens': lens.name, onclick: () => choose(lens.name), tip: lens.source }, picture('lens', lens.name, lens.own), h('span', {}, lens.title), h('small', {}, `f/${lens.f_number} · ${lens.rows - 1} surfaces${lens.own ? ' · yours' : ''}`))));
     lookGrid.replaceChildren(...matching(looks).map((look) => h('button', { type: 'button', 'data-look': look.name, onclick: () => wear(look.name), tip: look.notes }, picture('look', look.name), h('span', {}, look.title))));
     heading.hidden = !lookGrid.children.length;
     reported.textContent = lensGrid.children.length || lookGrid.children.length ? '' : 'No lens or look matches. A lens file can be dropped on the page.';
   }
   return {
     element: h('div', {}, h('div', { class: 'group' }, box, reported), lensGrid, heading, lookGrid),
-    async shown() { if (!lenses) { try { ({ lenses, looks } = await get('api/library')); draw(); } catch (error) { void error; } } },
+    async shown() { try { const known = JSON.stringify(lenses); ({ lenses, looks } = await get('api/library')); if (JSON.stringify(lenses) !== known) draw(); } catch (error) { void error; } },
     update(state) { for (const each of lensGrid.children) each.classList.toggle('on', each.dataset.lens === state.lens.shipped); },
   };
 }

@@ -5,6 +5,7 @@ Readers call `text_file.read_toml` or `text_file.read_text` and turn validation 
 
 - `atomic_write`: `write_atomically`, complete files or none
 - `door`: `outside`, the one way to a file of the user; `sentences_for`, `refuse_claim`, `expanded`, `shown`
+- `file_lock`: `held`, `locked`, locks between processes
 - `file_kind`: `refuse_other_kind`, errors for a file of another kind than the wanted one
 - `sentences`: `validation_sentences`, `did_you_mean`, `summary` and other helpers for error messages
 - `silence_libraries`: `silenced`, suppresses the output of libraries

@@ -9,7 +9,8 @@
 - `lens_fields`: number fields with limits, units and descriptions
 - `lens_schema`: `lens_json_schema`, the JSON Schema of our format
 - `lens_writer`: `write_lens`, `format_lens`
-- `library`: `library_names`, `lens_path`, the lenses that ship with the program
+- `library`: `library_names`, `lens_path`, lenses by name, shipped or of the user's library
+- `own`: the user's library of lenses: folder, records, index, search
 - `media`: `attach`, `complete_medium`, dispersions for the media of a prescription
 - `medium_names`: `named_medium`, `numbered_medium`, media as other programs write them
 - `plate_text`: `parse_plate`, `parse_imperfection`, `parse_grating`

@@ -1,0 +1,97 @@
+"""`flarewright library add`: add lens files to the user's library."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..common import (
+    APERTURES_HELP,
+    FIRST_COLUMN_HELP,
+    aperture_reading,
+    first_column_reading,
+    one_bar,
+    print_json,
+    print_remarks,
+)
+
+EPILOG = (
+    "Examples:\n\nflarewright library add ~/lenses\n\nflarewright library add patents.zip\n\n"
+    "flarewright library add tessar.zmx --name my-tessar"
+)
+# largest number of refused files that are listed one by one
+_LISTED = 200
+
+
+def add(
+    places: Annotated[list[Path], typer.Argument(metavar="FOLDER|ZIP|FILE...", help="Where the lens files are.")],
+    name: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Name of a single lens (default: that of its file).")
+    ] = None,
+    maker: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Maker of all lenses (default: found in their texts).")
+    ] = None,
+    apertures: Annotated[str | None, typer.Option(metavar="KIND", help=APERTURES_HELP)] = None,
+    first_column: Annotated[str | None, typer.Option(metavar="KIND", help=FIRST_COLUMN_HELP)] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Add lens files of every known kind to your library; commands then find them by name.
+
+    A file that the library has already is skipped, so an interrupted command resumes when it is repeated. Files that
+    are no usable lens are listed with the reason. Exit code 2 if there was no usable lens at all.
+    """
+    from ...io.files.door import expanded
+    from ...workflow.library_addition import add_lenses
+
+    reading, column = aperture_reading(apertures), first_column_reading(first_column)
+    with one_bar("library") as bar:
+        found = add_lenses(
+            [expanded(place) for place in places], name=name, maker=maker, apertures=reading, first_column=column,
+            progress=bar,
+        )  # fmt: skip
+    if as_json:
+        from ...io.lens.own.record import as_json as record_json
+
+        print_json(
+            {
+                "added": [record_json(record) for record in found.added],
+                "known": [{"file": file, "name": there} for file, there in found.known],
+                "refused": [{"file": one.file, "reason": one.reason} for one in found.refused],
+                "other_files": found.others,
+                "remarks": found.remarks,
+            }
+        )
+    else:
+        for record in found.added:
+            print(f"{record.name}: {record.title}, {record.file}")
+            for remark in record.remarks:
+                print(f"  - {remark}")
+        for one in found.refused[:_LISTED]:
+            reason = one.reason if Path(one.file).name in one.reason else f"{one.file}: {one.reason}"
+            print(f"flarewright: refused: {reason}", file=sys.stderr)
+        if len(found.refused) > _LISTED:
+            more = len(found.refused) - _LISTED
+            print(f"flarewright: and {more} more refused files, which --json lists", file=sys.stderr)
+        print_remarks(found.remarks)
+        print_remarks([_summary(len(found.added), len(found.known), len(found.refused), found.others)])
+    if not found.added and not found.known:
+        if found.refused:
+            print("flarewright: error: none of the files is a usable lens", file=sys.stderr)
+        else:
+            print("flarewright: error: there are no lens files: check the folder", file=sys.stderr)
+        raise typer.Exit(2)
+
+
+def _summary(added: int, known: int, refused: int, others: dict[str, int]) -> str:
+    from ...io.files.sentences import count
+
+    parts = [f"{count(added, 'lens', 'lenses')} added"]
+    parts += [f"{known} known already"] if known else []
+    parts += [f"{refused} refused"] if refused else []
+    if others:
+        kinds = ", ".join(f"{number} {suffix or 'without suffix'}" for suffix, number in list(others.items())[:8])
+        parts.append(f"other files left out: {kinds}")
+    return "; ".join(parts)
