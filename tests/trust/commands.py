@@ -32,6 +32,7 @@ ARGUMENTS: dict[str, tuple[str, ...]] = {
         "out.####.exr",
         "--json",
     ),
+    "nuke-script": ("flare.exr", "-o", "flare.nk", "--json"),
     "ghosts": ("tessar-brendel", "--light", "5,3", "--json"),
     "predict": ("tessar-brendel", "--samples", "5", "--quality", "draft", "--json"),
     "lenses": (),

@@ -44,6 +44,7 @@ READERS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("matte.png", (*RENDER, "--holdout", "matte.png")),
     ("flare.exr", (*RENDER, "--depth", "flare.exr")),
     ("flare.exr", ("design", "target", *ARGUMENTS["design target"])),
+    ("flare.exr", ("nuke-script", "flare.exr", "-o", "flare.nk", "--json")),
     ("photo.npy", ("design", "target", "photo.npy", "--light", "5,3", "--focal", "50", "-o", "target.toml")),
     ("photo.tiff", ("design", "target", "photo.tiff", "--light", "5,3", "--focal", "50", "-o", "target.toml")),
     ("photo.jpg", ("design", "target", "photo.jpg", "--light", "5,3", "--focal", "50", "-o", "target.toml")),

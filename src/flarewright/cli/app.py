@@ -47,6 +47,7 @@ from .project import scene_check, scene_init, scene_schema
 from .project import schema as project_schema
 from .render import command as render
 from .render import ghosts_command as ghosts
+from .render import nuke_command as nuke
 from .render import shot_command as shot
 
 # messages of older releases of Typer on option values
@@ -76,6 +77,7 @@ measure_app = typer.Typer(help="Measure a real camera's flare and replay it.")
 
 app.command("render", epilog=render.EPILOG)(render.render)
 app.command("shot", epilog=shot.EPILOG)(shot.shot)
+app.command("nuke-script", epilog=nuke.EPILOG)(nuke.nuke_script)
 app.command("ghosts", epilog=ghosts.EPILOG)(ghosts.ghosts)
 app.command("predict", epilog=predict.EPILOG)(predict.predict)
 app.command("lenses", epilog=lenses.EPILOG)(lenses.lenses)

@@ -20,6 +20,8 @@ The command line and other front ends call these functions; nothing here prints.
 - `keyframes`: `project_at`, a project with the values of its keyframes and curves at a time
 - `shot`: `shot` draws the frames of a moving project on all cores, with a `ShotResult`
 - `shot_frame`: `draw_frame`, one of them, and the digest of what made it
+- `nuke_script`: `nuke_script`, the text of a script or gizmo that composites a flare in Nuke
+- `nuke_graph`: `flare_nodes`, `nodes_text`, its nodes and their text
 - `motion_blur`: `subframe_count` and `mean_layers`, the mean over the open shutter
 - `long_jobs`: `JOBS` lists the commands that can run for more than a minute, and how each keeps its partial work
 - `defaults`: default sizes of predictions

@@ -7,6 +7,7 @@
 - `art_flags`: options for overrides: `--rule`, `--solo`, `--mute`, `--gain`, `--physical`
 - `profile_table`: `--profile`, the table of what each ghost costs
 - `preview`: the PNG: options, exposure, file
+- `nuke_command`: `flarewright nuke-script`
 - `shot_command`: `shot`, the frames of a moving project
 - `ghosts_command`: `ghosts`, the ghost analysis of a lens
 - `ghost_sweep`: its `--sweep` over fields, wavelengths and f-numbers
