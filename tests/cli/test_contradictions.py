@@ -23,6 +23,7 @@ def folder(tmp_path, monkeypatch):
     ("flags", "words"),
     [
         ("--half --float", "--half and --float both set"),
+        ("--float --compression dwaa", "--compression dwaa keeps 16 bits of a value and --float writes 32"),
         ("--physical --gain ghosts=2", "--gain is an override and --physical ignores"),
         ("--physical --mute 7-3", "--mute is an override"),
         ("--physical --starburst-size 2", "--starburst-size is an override"),

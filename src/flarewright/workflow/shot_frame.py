@@ -266,6 +266,7 @@ def _write(plan: ShotPlan, frame: int, moments: tuple[Project, ...], rendering: 
             colorspace=project.output.colorspace,
             full_windows=not plan.cropped,
             one_part=plan.parts == "single",
+            compression=project.output.compression,
             attributes=shot_attributes(
                 frame=frame, fps=frame_rate(plan.project.timeline.fps), shutter_s=plan.open_s, **facts
             ),

@@ -250,3 +250,38 @@ def test_other_channels_of_a_picture_by_others_are_left_out(tmp_path):
     OpenEXR.File(header, dict(channels)).write(str(tmp_path / "photo.exr"))
     [picture] = read_exr(tmp_path / "photo.exr").layers
     np.testing.assert_array_equal(picture.pixels[..., 1], channels["G"])
+
+
+def smooth(name, scale=1.0):
+    y, x = np.mgrid[: SIZE[1], : SIZE[0]]
+    pixels = scale * (0.5 + 0.4 * np.sin(x / 9.0) * np.cos(y / 7.0))[..., None] * np.array([1.0, 0.6, 0.3])
+    return Layer(name, pixels.astype(np.float32), (0, 0, *SIZE), {})
+
+
+@pytest.mark.parametrize("one_part", [False, True], ids=["parts", "one part"])
+def test_dwaa_changes_pixels_less_than_anyone_sees_and_keeps_large_values(tmp_path, one_part):
+    layers = [smooth("beauty"), smooth("ghosts"), smooth("beauty.variance", 1e-4)]
+    layers += [] if one_part else [smooth("starburst", 1e6)]
+    write_exr(tmp_path / "a.exr", layers, SIZE, compression="dwaa", one_part=one_part)
+    back = {one.name: one.pixels for one in read_exr(tmp_path / "a.exr").layers}
+    for one in layers:
+        np.testing.assert_allclose(back[one.name], one.pixels, rtol=0.01)
+    kinds = [part.header["compression"] for part in OpenEXR.File(str(tmp_path / "a.exr"), header_only=True).parts]
+    lossy, lossless = OpenEXR.DWAA_COMPRESSION, (OpenEXR.ZIP_COMPRESSION, OpenEXR.PXR24_COMPRESSION)
+    # a variance has 32 bits, and so have values beyond half's range
+    assert kinds == [OpenEXR.ZIP_COMPRESSION] if one_part else [lossy, lossy, *lossless]
+
+
+def test_dwaa_files_are_smaller(tmp_path):
+    rng = np.random.default_rng(3)
+    noise = (1.0 + 0.01 * rng.standard_normal((*SIZE[::-1], 3))).astype(np.float32)
+    noisy = Layer("beauty", smooth("beauty").pixels * noise, (0, 0, *SIZE), {})
+    for kind in ("zip", "dwaa"):
+        write_exr(tmp_path / f"{kind}.exr", [noisy], SIZE, compression=kind)
+    assert (tmp_path / "dwaa.exr").stat().st_size < 0.7 * (tmp_path / "zip.exr").stat().st_size
+
+
+def test_dwaa_of_32_bits_is_refused(tmp_path):
+    with pytest.raises(FlarewrightError, match="compression dwaa keeps 16 bits"):
+        write_exr(tmp_path / "a.exr", [smooth("beauty")], SIZE, pixel_type="float", compression="dwaa")
+    assert list(tmp_path.iterdir()) == []

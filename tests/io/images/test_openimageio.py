@@ -74,6 +74,15 @@ def test_one_part_has_the_channels_of_all_layers(tmp_path, kind):
         np.testing.assert_array_equal(pixels[..., places] / spec.getattribute("flarewright.scale"), one.pixels)
 
 
+def test_lossy_files_are_decoded_alike(tmp_path):
+    path = tmp_path / "a.exr"
+    write_exr(path, LAYERS[:3], SIZE, compression="dwaa")
+    ours, theirs = read_exr(path), parts(path)
+    for one, (_, spec, pixels) in zip(ours.layers, theirs, strict=True):
+        np.testing.assert_allclose(pixels / spec.getattribute("flarewright.scale"), one.pixels, rtol=1e-3, atol=1e-6)
+    assert theirs[0][1].getattribute("compression").startswith("dwaa")
+
+
 def test_attributes_of_a_shot_are_the_standard_ones(tmp_path):
     path = tmp_path / "a.exr"
     attributes = shot_attributes(

@@ -106,6 +106,8 @@ def project_of_options(
     """Build the project that the options ask for; return them with their look, the project and remarks."""
     if options.half and options.float32:
         raise ProjectError("--half and --float both set the bits per value; keep one")
+    if options.float32 and options.compression == "dwaa":
+        raise ProjectError("--compression dwaa keeps 16 bits of a value and --float writes 32; keep one")
     from .look_flags import photographed, put_look, settings_of
     from .project_flags import build_project
 
@@ -319,6 +321,7 @@ def _write(
             pixel_aspect=project.camera.pixel_aspect,
             colorspace=project.output.colorspace,
             full_windows=full_windows,
+            compression=project.output.compression,
         )
     )
     outside = negative_share(rendering.layers[0])

@@ -250,6 +250,7 @@ def _sections(flags: RenderOptions) -> dict[str, dict[str, Any]]:
             "colorspace": flags.colorspace,
             "gamut": flags.gamut,
             "pixel_type": "half" if flags.half else "float" if flags.float32 else None,
+            "compression": flags.compression,
             "starburst": False if flags.no_starburst else None,
         },
     }

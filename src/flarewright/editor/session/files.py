@@ -300,6 +300,7 @@ def export_picture(project: Project, path: Path, progress: Progress | None = Non
         path, rendering.layers, project.camera.size_px, pixel_type=project.output.pixel_type,
         scale=exr_scale(project), metadata={"version": __version__, "project": project_text(project)},
         pixel_aspect=rendering.project.camera.pixel_aspect, colorspace=project.output.colorspace,
+        compression=project.output.compression,
     )  # fmt: skip
 
 

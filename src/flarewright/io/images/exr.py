@@ -105,6 +105,7 @@ def write_exr(
     full_windows: bool = False,
     attributes: Mapping[str, Any] | None = None,
     one_part: bool = False,
+    compression: Literal["zip", "dwaa"] = "zip",
 ) -> tuple[str, ...]:
     """Write layers into one EXR file, atomically.
 
@@ -134,6 +135,9 @@ def write_exr(
     one_part : bool
         Write one part with the channels of all layers, for programs that read no parts. Implies `full_windows`; if one
         layer needs 32 bits, its channels have them.
+    compression : {"zip", "dwaa"}
+        zip is lossless. dwaa, for half floats, is lossy (cosine transform, level 45): smaller files, errors that
+        pictures do not show. Layers with 32 bits keep their lossless compression, and with `one_part` all do.
 
     Returns
     -------
@@ -152,6 +156,8 @@ def write_exr(
         raise FlarewrightError(f"an EXR file needs at least one layer and no name twice, not {names}")
     if scale is None:
         scale = half_scale() if pixel_type == "half" else 1.0
+    if compression == "dwaa" and pixel_type != "half":
+        raise FlarewrightError("compression dwaa keeps 16 bits of a value: give pixel_type half, or compression zip")
     if not _is_scale(scale):
         raise FlarewrightError(f"scale {scale!r} is no power of two from 2^-63 to 2^63; give exr_scale(project)")
     if "scale" in (metadata or {}):
@@ -167,7 +173,11 @@ def write_exr(
             # a project can name files whose names are not UTF-8
             header |= {f"{_PREFIX}{name}": printable(text) for name, text in (metadata or {}).items()}
             header |= attributes or {}
-        parts.append(_part(layer.name, pixels, header, scale, half=pixel_type == "half", first=k == 0))
+        parts.append(
+            _part(
+                layer.name, pixels, header, scale, half=pixel_type == "half", first=k == 0, lossy=compression == "dwaa"
+            )
+        )
     if one_part:
         parts = [_joined(parts)]
     if printable(str(path)) != str(path):
@@ -178,7 +188,9 @@ def write_exr(
     return (f"the EXR holds irradiances times {scale:.9g}, its attribute {_SCALE}; --float writes them as they are",)
 
 
-def _part(name: str, pixels: Pixels, header: dict[str, Any], scale: float, *, half: bool, first: bool) -> Any:
+def _part(
+    name: str, pixels: Pixels, header: dict[str, Any], scale: float, *, half: bool, first: bool, lossy: bool
+) -> Any:
     """Return the part of a layer; the header gets its scale and compression."""
     import OpenEXR
 
@@ -187,17 +199,21 @@ def _part(name: str, pixels: Pixels, header: dict[str, Any], scale: float, *, ha
     values = _stored(pixels, by, half)
     large = half and values.dtype == np.float32
     header = header | {_SCALE: by} | ({"compression": OpenEXR.PXR24_COMPRESSION} if large else {})
+    if lossy and values.dtype == np.float16:
+        # of larger values it would keep 16 bits, which overflow
+        header["compression"] = OpenEXR.DWAA_COMPRESSION
     # one array of three channels instead of separate planes halves the memory: "RGB" becomes R, G, B, any other name
     # becomes NAME.R, NAME.G, NAME.B
     return OpenEXR.Part(header, {"RGB" if first else name: values}, name)
 
 
 def _joined(parts: list[Any]) -> Any:
-    """Return one part with the channels of all; its header is the first one's, with lossless compression."""
+    """Return one part with the channels of all and the first one's header; lossless unless no layer needs 32 bits."""
     import OpenEXR
 
     channels = {name: channel for part in parts for name, channel in part.channels.items()}
-    header = parts[0].header | {"compression": OpenEXR.ZIP_COMPRESSION}
+    small = all(part.header["compression"] == OpenEXR.DWAA_COMPRESSION for part in parts)
+    header = parts[0].header | {"compression": OpenEXR.DWAA_COMPRESSION if small else OpenEXR.ZIP_COMPRESSION}
     for part in parts[1:]:
         if (scale := part.header[_SCALE]) != header[_SCALE]:
             header[f"{_SCALE}.{part.name()}"] = scale

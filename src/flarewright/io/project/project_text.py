@@ -72,6 +72,7 @@ ABOUT = {
     "output.colorspace": '"rec709" or "acescg", linear',
     "output.gamut": '"keep" negative channels, or "compress" colours to avoid them',
     "output.pixel_type": '"half": 16 bits per value, or "float": 32 bits',
+    "output.compression": '"zip": lossless, or "dwaa": lossy and smaller',
 }
 
 _COMMENTED_DIRT = """

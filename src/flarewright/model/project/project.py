@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, StrictBool, field_validator
+from pydantic import Field, StrictBool, field_validator, model_validator
 
 from ..base import Frozen
 from ..lens.coating import COATINGS, Coating
@@ -144,6 +144,8 @@ class Output(Frozen):
     pixel_type : {"half", "float"}
         half: 16 bits per value, irradiances times a constant of the lights (`io.images.half.exr_scale`); float: 32
         bits, irradiances unscaled.
+    compression : {"zip", "dwaa"}
+        zip: lossless; dwaa: lossy, smaller files, for half floats only.
     starburst : bool
         Whether the picture includes the direct image of the light with its diffraction pattern.
     """
@@ -153,7 +155,14 @@ class Output(Frozen):
     colorspace: Colorspace = "rec709"
     gamut: Literal["keep", "compress"] = "keep"
     pixel_type: Literal["half", "float"] = "half"
+    compression: Literal["zip", "dwaa"] = "zip"
     starburst: StrictBool = True
+
+    @model_validator(mode="after")
+    def _dwaa_keeps_16_bits(self) -> Output:
+        if self.compression == "dwaa" and self.pixel_type == "float":
+            raise ValueError('compression "dwaa" keeps 16 bits of a value, and pixel_type "float" writes 32: keep one')
+        return self
 
 
 class Project(Frozen):

@@ -40,3 +40,7 @@ class LayerOptions:
     float32: Annotated[
         bool, typer.Option("--float", help="Write 32 bits per value, unscaled irradiances.", rich_help_panel=PANEL)
     ] = False
+    compression: Annotated[
+        str | None,
+        typer.Option(help="Compression of the EXR: zip, lossless (default), or dwaa, lossy.", rich_help_panel=PANEL),
+    ] = None
