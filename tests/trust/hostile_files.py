@@ -26,6 +26,7 @@ READERS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("lens.lens", ("lens", "check", "lens.lens", "--json")),
     ("lens.zmx", ("lens", "check", "lens.zmx", "--json")),
     ("lens.seq", ("lens", "check", "lens.seq", "--json", "--first-column", "curvatures")),
+    ("lens.len", ("lens", "check", "lens.len", "--json")),
     ("lens.csv", ("lens", "check", "lens.csv", "--json")),
     ("lens.dat", ("lens", "check", "lens.dat", "--json")),
     ("lens.json", ("lens", "check", "lens.json", "--json")),
@@ -127,6 +128,31 @@ S -0.02 100
 SI 0 0
 GO
 """
+OSLO = """\
+// OSLO 6.6 58447 0 0
+LEN NEW "A plano-convex lens" 100 4
+EBR 10; ANG 5
+UNI 1.0
+// SRF 0
+AIR
+TH 1e20
+NXT // SRF 1
+AST
+TH 2
+NXT
+WV 0.58756 0.48613 0.65627
+GLA MOD OWN 1.5 1.507 1.497
+TH 4
+AP CHK 12
+NXT
+RD -50
+TH 100
+AP 12
+CC -0.5; AD 1e-7
+NXT
+WV 0.58756 0.48613 0.65627
+END 4
+"""
 TABLE = """\
 # f_number = 5
 radius,thickness,n_d,v_d,semi_diameter,A4
@@ -181,7 +207,7 @@ def _more(folder: Path) -> None:
     """Write the files that only readers need."""
     (folder / "lens.lens").write_text(DOTLENS, "utf-8")
     (folder / "lens.zmx").write_text(ZEMAX, "utf-8")
-    for name, text in (("seq", CODEV), ("csv", TABLE), ("dat", PBRT), ("json", REALFLARE)):
+    for name, text in (("seq", CODEV), ("len", OSLO), ("csv", TABLE), ("dat", PBRT), ("json", REALFLARE)):
         (folder / f"lens.{name}").write_text(text, "utf-8")
     (folder / "look.toml").write_text(LOOK, "utf-8")
     (folder / "spectrum.csv").write_text("400,1\n500,2\n600,1.5\n700,1\n", "utf-8")

@@ -197,8 +197,8 @@ def imported(
     plain = Path(name).name or "dropped"
     if suffix not in (*LENS_SUFFIXES, *PICTURES):
         raise LensError(
-            f"{plain} cannot be opened here: drop a lens (.toml, .lens, .zmx, .seq, .dat, .csv, .json), a measured "
-            "flare (.json), a project or a look (.toml), or a background picture (.exr, .png, .jpg)"
+            f"{plain} cannot be opened here: drop a lens (.toml, .lens, .zmx, .seq, .len, .dat, .csv, .json), a "
+            "measured flare (.json), a project or a look (.toml), or a background picture (.exr, .png, .jpg)"
         )
     # a new file name for new contents, so that undo finds the old picture
     folder = folder / hashlib.sha256(data).hexdigest()[:12]

@@ -124,7 +124,7 @@ export function lensPanel(app) {
   app.commandQuietly = async (name, values, table) => {
     await app.line(async () => app.take(await post('api/do', { name, values, table })));
   };
-  const picker = h('input', { type: 'file', accept: '.toml,.lens,.zmx,.seq,.dat,.csv,.json', hidden: true });
+  const picker = h('input', { type: 'file', accept: '.toml,.lens,.zmx,.seq,.len,.dat,.csv,.json', hidden: true });
   picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0]); picker.value = ''; });
   return {
     element: h('div', {}, own.element, h('div', { class: 'group' }, facts, source, h('div', { class: 'buttons' }, add, copy, remove, stop, button('Import…', () => picker.click(), { tip: 'A lens file; it can also be dropped on the page.' })), picker), table, wrong, notes, glasses),

@@ -10,7 +10,7 @@ from flarewright.errors import FileError
 
 from .door import outside
 
-FOREIGN_LENS_SUFFIXES = (".lens", ".zmx", ".seq", ".dat", ".csv")
+FOREIGN_LENS_SUFFIXES = (".lens", ".zmx", ".seq", ".len", ".dat", ".csv")
 """Lens files of other programs; `.json` is a lens or a measured flare."""
 LENS_SUFFIXES = (".toml", *FOREIGN_LENS_SUFFIXES, ".json")
 WRITTEN_LENS_SUFFIXES = (".toml", ".zmx", ".lens", ".csv", ".json")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 from flarewright.errors import GlassError
 from flarewright.model import Medium
@@ -87,3 +88,38 @@ def numbered_medium(
         return None
     findings.append((number, finding))
     return medium
+
+
+def tabulated_medium(
+    wavelengths_nm: Sequence[float],
+    indices: Sequence[float],
+    place: str,
+    problems: list[str],
+    findings: list[tuple[int, media.Finding]],
+    number: int,
+) -> Medium | None:
+    """Return the medium of a table of indices, by those at the d, F and C lines; None after an error.
+
+    Parameters
+    ----------
+    wavelengths_nm, indices : sequence of float
+        At least two, as many indices as wavelengths.
+    place, problems, findings, number
+        As in `named_medium`.
+
+    Returns
+    -------
+    Medium or None
+    """
+    n_d, n_f, n_c = (_index(wavelengths_nm, indices, line_nm) for line_nm in (587.5618, 486.1327, 656.2725))
+    v_d = (n_d - 1.0) / (n_f - n_c) if n_f > n_c else None
+    return numbered_medium(None, n_d, v_d, place, problems, findings, number)
+
+
+def _index(wavelengths_nm: Sequence[float], indices: Sequence[float], line_nm: float) -> float:
+    """Return an index between tabulated ones, linear in 1 / wavelength^2 as in Cauchy's formula."""
+    pairs = sorted(zip((1.0 / nm**2 for nm in wavelengths_nm), indices, strict=True))
+    at = 1.0 / line_nm**2
+    k = min(max(sum(x < at for x, _ in pairs), 1), len(pairs) - 1)
+    (x0, y0), (x1, y1) = pairs[k - 1], pairs[k]
+    return y0 + (y1 - y0) * (at - x0) / (x1 - x0) if x1 != x0 else y0

@@ -15,6 +15,7 @@ A row without `glass` and `n_d` has air behind it. `lens_json_schema` documents 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -33,7 +34,7 @@ from ..files.text_file import read_bytes, read_toml
 from . import media
 from .coating_text import coating_from
 from .foreign_file import MOST_SURFACES
-from .formats import codev, dotlens, optiland, realflare, tables
+from .formats import codev, dotlens, optiland, oslo, realflare, tables
 from .lens_fields import (
     CURVATURE,
     RADIUS,
@@ -49,6 +50,10 @@ from .scatter_text import read_scatter
 from .shape_fields import read_elements, read_positions, read_shape
 from .zemax import reader as zemax
 
+_FOREIGN: dict[str, Callable[[str | Path], RawLens | RawSequence]] = {
+    ".lens": dotlens.read_dotlens, ".zmx": zemax.read_zmx, ".len": oslo.read_len, ".dat": tables.read_dat,
+    ".csv": tables.read_csv_table,
+}  # fmt: skip
 # tolerance of a rim beyond the surface's equator, for rounded numbers
 ROUNDED = 1e-6
 # asphere terms that change the rim's height by more than this factor have wrong units
@@ -64,8 +69,8 @@ def read_lens(
     ----------
     path : str or Path
         `.toml` is our own format; `.lens` is a text table that several flare tools share; `.zmx` is a sequential file
-        of Zemax, `.seq` one of CODE V; `.dat` is a lens of pbrt, `.csv` a table, `.json` a lens of RealFlare or
-        of Optiland.
+        of Zemax, `.seq` one of CODE V, `.len` one of OSLO; `.dat` is a lens of pbrt, `.csv` a table, `.json` a lens of
+        RealFlare or of Optiland.
     first_column : {"radii", "curvatures"}, optional
         Of a `.seq` file that does not state it.
 
@@ -81,16 +86,10 @@ def read_lens(
         When the file cannot be read or is invalid; `problems` lists every error.
     """
     suffix = Path(path).suffix.lower()
-    if suffix == ".lens":
-        return dotlens.read_dotlens(path)
-    if suffix == ".zmx":
-        return zemax.read_zmx(path)
     if suffix == ".seq":
         return codev.read_seq(path, first_column)
-    if suffix == ".dat":
-        return tables.read_dat(path)
-    if suffix == ".csv":
-        return tables.read_csv_table(path)
+    if (read := _FOREIGN.get(suffix)) is not None:
+        return read(path)
     if suffix == ".json" and (key := lens_key(path)):
         return optiland.read_optiland(path) if key == OPTILAND_KEY else realflare.read_realflare(path)
     if suffix == ".toml" or Path(path).is_dir() or not Path(path).exists():
@@ -104,7 +103,7 @@ def read_lens(
             "predict and edit accept it, and so does render_measured in Python"
         )
     raise LensError(
-        f"{path} is of an unknown kind: Flarewright reads .toml (its own), .lens, .zmx, .seq, .dat, .csv and "
+        f"{path} is of an unknown kind: Flarewright reads .toml (its own), .lens, .zmx, .seq, .len, .dat, .csv and "
         "the .json files of RealFlare and Optiland"
     )
 

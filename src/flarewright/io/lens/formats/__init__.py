@@ -3,6 +3,7 @@
 - `codev`: `read_seq`, the `.seq` format of CODE V
 - `dotlens`: `read_dotlens`, the `.lens` format
 - `optiland`: `read_optiland`, `optiland_text`, the lenses of Optiland
+- `oslo`: `read_len`, the `.len` format of OSLO
 - `realflare`: `read_realflare`, the lenses of RealFlare
 - `table_rows`: `sequence_of`, rows of simple tables
 - `table_writer`: `csv_text`, `dotlens_text`

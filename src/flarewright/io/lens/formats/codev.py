@@ -28,7 +28,7 @@ from ...files.text_file import read_bytes
 from .. import media
 from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_errors, number_of
 from ..lens_fields import CURVATURE
-from ..medium_names import named_medium, numbered_medium
+from ..medium_names import named_medium, tabulated_medium
 
 FirstColumn = Literal["radii", "curvatures"]
 
@@ -288,18 +288,9 @@ def _medium(word: str, number: int, reading: _Reading) -> Medium | None:
     indices = reading.private.get(word.strip("'\"").upper())
     if indices is None:
         return named_medium(word, f"surface {number}", reading.problems, reading.findings, number)
-    n_d, n_f, n_c = (_index(reading.private_nm, indices, line_nm) for line_nm in (587.5618, 486.1327, 656.2725))
-    v_d = (n_d - 1.0) / (n_f - n_c) if n_f > n_c else None
-    return numbered_medium(None, n_d, v_d, f"surface {number}", reading.problems, reading.findings, number)
-
-
-def _index(wavelengths_nm: list[float], indices: list[float], line_nm: float) -> float:
-    """Return an index between tabulated ones, linear in 1 / wavelength^2 as in Cauchy's formula."""
-    pairs = sorted(zip((1.0 / nm**2 for nm in wavelengths_nm), indices, strict=True))
-    at = 1.0 / line_nm**2
-    k = min(max(sum(x < at for x, _ in pairs), 1), len(pairs) - 1)
-    (x0, y0), (x1, y1) = pairs[k - 1], pairs[k]
-    return y0 + (y1 - y0) * (at - x0) / (x1 - x0) if x1 != x0 else y0
+    return tabulated_medium(
+        reading.private_nm, indices, f"surface {number}", reading.problems, reading.findings, number
+    )  # fmt: skip
 
 
 def _object_distance(surface: _Surface, mm: float, reading: _Reading) -> float | None:
