@@ -27,7 +27,7 @@ def test_the_users_lenses_come_before_the_shipped_ones(own):
     assert (first["name"], first["own"], first["rows"]) == (own, True, len(open_lens(own).lens.rows))
     assert "my triplet.toml" in first["words"]
     assert {one["own"] for one in others} == {False}
-    # the list is current: it is asked for whenever the panel opens
+    # the list is current: the page requests it whenever the panel opens
     add_lenses([open_lens("petzval-kodak").path], name="petzval-2")
     assert [one["name"] for one in diagrams.library()[:2]] == [own, "petzval-2"]
 
@@ -64,25 +64,26 @@ def test_one_process_draws_what_is_missing_and_ends_with_the_editor(own, monkeyp
     monkeypatch.setattr("os.setpriority", lambda *_: None, raising=False)
     assert read_thumbnail(own) is None
     maker = ThumbnailMaker()
-    maker.ask()
-    maker.ask()
-    assert len(started) == 1
-    assert started[0][-4:-1] == ["library", "thumbnails", "--most"]
+    maker.ask(own)
+    maker.ask("another")
+    maker.ask("a third")
+    assert [words[-2:] for words in started] == [["--", own]]
     # the next one starts when it has ended and something is still missing
     maker._child.code = 0
-    maker.ask()
-    assert len(started) == 2
+    maker.ask("another")
+    # the latest request first
+    assert started[1][-3:] == ["--", "another", "a third"]
     child = maker._child
     maker.close()
     assert child.code == -15
-    maker.ask()
+    maker.ask(own)
     assert len(started) == 2
 
 
 @pytest.mark.slow
 def test_a_real_process_draws_the_thumbnail(own):
     maker = ThumbnailMaker()
-    maker.ask()
+    maker.ask(own)
     until = time.monotonic() + 120.0
     while read_thumbnail(own) is None and time.monotonic() < until:
         time.sleep(0.1)

@@ -46,7 +46,7 @@ ARGUMENTS: dict[str, tuple[str, ...]] = {
     "library search": ("tessar", "--own", "--json"),
     "library show": ("mine", "--json"),
     "library remove": ("mine",),
-    "library thumbnails": ("--most", "1"),
+    "library thumbnails": ("mine",),
     "looks save": ("warm.toml", "-o", "look.toml"),
     "coating list": (),
     "coating plot": ("quarter-wave:550", "-o", "coating.svg"),

@@ -1,4 +1,4 @@
-"""The user's library: what is added is the lens of the file, once, under a free name, whatever else happens."""
+"""The user's library: what is added is the lens of the file, once, under a free name, also with several processes."""
 
 import os
 from dataclasses import replace

@@ -210,7 +210,7 @@ def test_every_pattern_is_written_as_nuke_does(shot, tmp_path, pattern):
     assert value(reader.knobs["file"]) == str(tmp_path / "flare.####.exr")
 
 
-def test_layers_that_do_not_add_up_are_not_taken_apart(tmp_path):
+def test_layers_that_do_not_add_up_are_stay_together(tmp_path):
     pixels = np.full((9, 16, 3), 0.5, np.float32)
     path = tmp_path / "a.exr"
     write_exr(path, [Layer("beauty", pixels, (0, 0, *SIZE), {}), Layer("ghosts", pixels / 2, (0, 0, *SIZE), {})], SIZE)

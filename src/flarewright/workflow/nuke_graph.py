@@ -1,4 +1,4 @@
-"""The nodes that take a flare apart and put it together again in Nuke, and their text.
+"""The nodes that split a flare into passes and add them in Nuke, and their text.
 
 A script is a list of nodes. `push $NAME` puts the result of an earlier node on a stack, a node takes its inputs from
 the stack's top (the first one last pushed), and `set NAME [stack 0]` names its result. Values with other letters than
@@ -30,7 +30,7 @@ class Node:
     name : str
         Letters, digits and underscores.
     knobs : tuple of (str, str)
-        Values as they stand in the file (`quoted`).
+        Values in the words of the file (`quoted`).
     inputs : tuple of str
         Names of nodes; of a Merge2 first B, then A.
     place : tuple of int
@@ -64,7 +64,7 @@ class Passes:
 
 
 def quoted(text: str) -> str:
-    r"""Return a value as it stands in a script.
+    r"""Return a value in the words of a script.
 
     Examples
     --------

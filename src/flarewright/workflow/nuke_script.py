@@ -102,7 +102,7 @@ def nuke_script(
     Raises
     ------
     ProjectError
-        There are no files, or frames are asked that do not exist.
+        There are no files, or the first of the chosen frames does not exist.
     OutputError
         A file is no EXR of Flarewright's.
 

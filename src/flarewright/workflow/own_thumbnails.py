@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +15,8 @@ from ..io.files.atomic_write import write_atomically
 from ..io.files.door import sentences_for
 from ..io.files.text_file import read_bytes
 from ..io.images.thumbnails import SIZE_PX
-from ..io.lens.library import lens_path
-from ..io.lens.own.folder import own_lenses, thumbnail_file, writable_folder
+from ..io.lens.library import lens_path, library_names
+from ..io.lens.own.folder import key_of, own_lenses, thumbnail_file, writable_folder
 from ..render.gallery import card_project, lens_card
 from ..render.image.display import layers_exposure, view
 from ..render.render import render
@@ -29,7 +28,11 @@ _GREY = 72
 
 def missing_thumbnails() -> Iterator[str]:
     """Yield the names of the user's lenses that have no thumbnail, or one that is older than the lens."""
+    shipped = {key_of(name) for name in library_names()}
     for name, path in own_lenses().items():
+        if key_of(name) in shipped:
+            # its name is that of another lens
+            continue
         picture = thumbnail_file(name)
         try:
             if not picture.exists() or picture.stat().st_mtime_ns < path.stat().st_mtime_ns:
@@ -40,15 +43,15 @@ def missing_thumbnails() -> Iterator[str]:
 
 
 def make_thumbnails(
-    progress: Progress | None = None, most: int | None = None
+    progress: Progress | None = None, wanted: Sequence[str] | None = None
 ) -> tuple[int, tuple[tuple[str, str], ...]]:
     """Render the missing thumbnails; a lens that cannot be drawn gets a grey one, so that it is not tried again.
 
     Parameters
     ----------
     progress : callable, optional
-    most : int, optional
-        Largest number; None: all.
+    wanted : sequence of str, optional
+        Names of lenses, in this order; None: all.
 
     Returns
     -------
@@ -61,7 +64,8 @@ def make_thumbnails(
     OutputError
         The library cannot be written.
     """
-    names, made = list(islice(missing_thumbnails(), most)), 0
+    missing, made = list(missing_thumbnails()), 0
+    names = missing if wanted is None else [name for name in wanted if name in missing]
     failed: list[tuple[str, str]] = []
     for k, name in enumerate(names):
         if progress is not None:

@@ -12,12 +12,15 @@ EPILOG = "The editor does this in the background when its panel Library is open.
 
 
 def thumbnails(
-    most: Annotated[int | None, typer.Option(metavar="N", min=1, help="Render at most N (default: all).")] = None,
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="[NAME...]", help="Lenses of your library (default: all).")
+    ] = None,
 ) -> None:
     """Render the missing thumbnails of your library as drafts; an interrupted command resumes."""
+    from ...workflow.own_lenses import find_own
     from ...workflow.own_thumbnails import make_thumbnails
 
     with one_bar("thumbnails") as bar:
-        made, failed = make_thumbnails(bar, most)
+        made, failed = make_thumbnails(bar, [find_own(name)[0] for name in names] if names else None)
     print_remarks([f"no thumbnail of {name}: {reason}" for name, reason in failed])
     print_remarks([f"{made} rendered"])

@@ -11,11 +11,12 @@ from ...design.coatings.colors import indices_of, pair_map
 from ...design.problem.ghosts import placed_ghosts
 from ...design.problem.grey_picture import png_bytes
 from ...design.problem.prescription import structure_of
-from ...errors import FlarewrightError, ProjectError
+from ...errors import ProjectError
 from ...io.images.mask_image import read_mask
 from ...io.lens.coating_text import format_coating
 from ...io.lens.library import library_names
 from ...io.lens.own.folder import key_of
+from ...io.lens.own.record import LensRecord
 from ...io.project.look_file import read_look, shipped_looks
 from ...model import Coating, Project, Surface
 from ...model.project.design import Bounds
@@ -26,6 +27,7 @@ from ...render.plots.coating_plot import PANEL, PLOT_ANGLES_DEG, STRIP_ANGLES_DE
 from ...render.plots.cross_section import cross_section
 from ...render.plots.svg import to_svg
 from ...render.scene.resolve import open_lens, resolve_project
+from ...workflow.lens_record import shipped_records
 from ...workflow.own_lenses import own_library
 from .display_image import png
 
@@ -140,32 +142,20 @@ def library() -> tuple[dict[str, object], ...]:
     """Return the user's lenses, then the shipped ones: name, title, patent, and words to search."""
     # a shipped lens hides one of the user that has its name
     shipped = {key_of(name) for name in library_names()}
-    own = tuple(
-        {
-            "name": one.name, "title": one.title, "source": one.source or one.file, "f_number": round(one.f_number, 2),
-            "rows": one.surfaces + 1, "words": one.words, "own": True,
-        }
-        for one in own_library().records if key_of(one.name) not in shipped
-    )  # fmt: skip
+    own = tuple(_entry(one, own=True) for one in own_library().records if key_of(one.name) not in shipped)
     return (*own, *_shipped_lenses())
 
 
 @lru_cache(maxsize=1)
 def _shipped_lenses() -> tuple[dict[str, object], ...]:
-    out = []
-    for name in library_names():
-        try:
-            lens = open_lens(name).lens
-        except FlarewrightError:
-            continue
-        out.append(
-            {
-                "name": name, "title": lens.name, "source": lens.source, "f_number": lens.f_number,
-                "rows": len(lens.rows), "words": f"{name} {lens.name} {lens.source} f/{lens.f_number:g}".lower(),
-                "own": False,
-            }
-        )  # fmt: skip
-    return tuple(out)
+    return tuple(_entry(one, own=False) for one in shipped_records())
+
+
+def _entry(record: LensRecord, *, own: bool) -> dict[str, object]:
+    return {
+        "name": record.name, "title": record.title, "source": record.source or record.file,
+        "f_number": round(record.f_number, 2), "rows": record.surfaces + 1, "words": record.words, "own": own,
+    }  # fmt: skip
 
 
 @lru_cache(maxsize=1)

@@ -325,7 +325,7 @@ def _thumbnail(workspace: Workspace, request: Request, _body: Any) -> Any:
     if (data := read_thumbnail(name)) is not None:
         return _jpeg(data)
     # the page asks again
-    workspace.thumbnails.ask()
+    workspace.thumbnails.ask(name)
     return Response(status_code=204, headers=_FRESH)
 
 

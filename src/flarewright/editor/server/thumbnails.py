@@ -11,7 +11,7 @@ from contextlib import suppress
 from ..common.latest_job import NICENESS
 
 # pictures of one child process: it ends after them, also when the editor has crashed
-_MOST = 40
+_MOST = 12
 
 
 class ThumbnailMaker:
@@ -20,18 +20,24 @@ class ThumbnailMaker:
     def __init__(self) -> None:
         self._child: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
+        # in the order of the requests: those that a page shows now are the last ones
+        self._wanted: dict[str, None] = {}
         self._closed = False
 
-    def ask(self) -> None:
-        """Render missing thumbnails soon; do nothing if that is under way or no process can be started."""
+    def ask(self, name: str) -> None:
+        """Render the thumbnail of one of the user's lenses soon; the page asks again until it is there."""
         with self._lock:
+            self._wanted.pop(name, None)
+            self._wanted[name] = None
             if self._closed or (self._child is not None and self._child.poll() is None):
                 return
             # one thread: the page draws on the other cores
             environment = os.environ | {"NUMBA_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
+            names = list(self._wanted)[: -_MOST - 1 : -1]
+            self._wanted.clear()
             with suppress(OSError):
                 self._child = subprocess.Popen(
-                    [sys.executable, "-m", "flarewright", "library", "thumbnails", "--most", str(_MOST)],
+                    [sys.executable, "-m", "flarewright", "library", "thumbnails", "--", *names],
                     env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                 )  # fmt: skip
                 if hasattr(os, "setpriority"):

@@ -18,7 +18,8 @@ export function libraryPanel(app) {
     const image = h('img', { alt: '', src: address, loading: 'lazy' });
     let tries = 0;
     // pictures of the user's lenses are rendered in the background; ask again, ever less often, while they are shown
-    if (own) image.addEventListener('error', () => { tries += 1; setTimeout(() => { if (image.isConnected) image.src = `${address}?again=${tries}`; }, Math.min(3000 * tries, 30000)); });
+    image.addEventListener('load', () => { image.style.visibility = ''; });
+    if (own) image.addEventListener('error', () => { image.style.visibility = 'hidden'; tries += 1; setTimeout(() => { if (image.isConnected) image.src = `${address}?again=${tries}`; }, Math.min(3000 * tries, 30000)); });
     return image;
   }
   function draw() {
