@@ -70,7 +70,7 @@ def test_tables_for_people_name_every_lens(folder, capsys):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ("library add my/broken.lens", "none of the files is a usable lens"),
+        ("library add my/broken.lens", 'broken.lens: the table behind "surfaces:" is empty'),
         ("library add empty", "there are no lens files: check the folder"),
         ("library add nowhere", "nowhere does not exist"),
         ("library add my --name one", "--name gives one lens its name, and my holds 3 files"),

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 import flarewright as fw
-from flarewright.errors import FileError, LensError, OutputError
+from flarewright.errors import FileError, LensError, OutputError, ProjectError
 from flarewright.io.lens.lens_writer import write_lens
 from flarewright.io.lens.library import is_own, lens_path, library_name, near_names
 from flarewright.io.lens.own.folder import lenses_folder, library_folder, own_lenses
@@ -111,8 +111,9 @@ def test_the_name_of_a_shipped_lens_stays_its_own(state, tmp_path):
 def test_a_name_that_is_given_is_used_or_refused(files, state):
     assert add_lenses([files / "Triplet.csv"], name="Mine", maker="Me").added[0].name == "mine"
     assert own_library().records[0].maker == "Me"
-    assert add_lenses([files / "Petzval.lens"], name="mine").refused[0].reason.startswith("the name mine is taken")
-    with pytest.raises(LensError, match=r"--name gives one lens its name, and .* holds 6 files"):
+    with pytest.raises(ProjectError, match="the name mine is taken"):
+        add_lenses([files / "Petzval.lens"], name="mine")
+    with pytest.raises(ProjectError, match=r"--name gives one lens its name, and .* holds 6 files"):
         add_lenses([files], name="mine")
 
 
@@ -190,6 +191,18 @@ def test_pictures_of_a_lens_come_to_the_library_and_leave_with_the_last_lens(sta
     remove_lens("a1")
     assert not picture.exists()
     assert own_lenses() == {}
+
+
+def test_a_lens_cannot_make_the_library_copy_or_delete_other_files(state, tmp_path):
+    lens = fw.load_lens("triplet-pestrecov")
+    (tmp_path / "secret").write_text("no picture")
+    write_lens(lens.replace(iris=fw.Iris(mask=str(tmp_path / "secret"))), tmp_path / "a.toml")
+    assert "secret" in add_lenses([tmp_path / "a.toml"]).refused[0].reason
+    write_lens(lens.replace(notes='mask = "../images/../../../secret"'), tmp_path / "b.toml")
+    add_lenses([tmp_path / "b.toml"])
+    remove_lens("b")
+    assert (tmp_path / "secret").exists()
+    assert list((library_folder() / "images").iterdir()) == []
 
 
 def test_a_library_that_cannot_be_written_is_reported_in_one_sentence(files, tmp_path, monkeypatch):

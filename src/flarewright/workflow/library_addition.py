@@ -12,10 +12,11 @@ from pathlib import Path
 from shutil import copyfile
 from typing import IO
 
-from ..errors import FlarewrightError, LensError, OutputError
+from ..errors import FlarewrightError, LensError, OutputError, ProjectError
 from ..io.files.atomic_write import write_atomically
 from ..io.files.door import sentences_for, shown
 from ..io.files.text_file import digest_of
+from ..io.images.mask_image import read_mask
 from ..io.lens.formats.codev import FirstColumn
 from ..io.lens.lens_writer import format_lens
 from ..io.lens.library import library_names
@@ -108,7 +109,7 @@ def add_lenses(
     ------
     FileError
         A place does not exist, is no archive, or is too large.
-    LensError
+    ProjectError
         `name` is given for several lens files, or is taken.
     OutputError
         The library cannot be written; lenses that were added before stay.
@@ -131,7 +132,7 @@ def add_lenses(
     for k, place in enumerate(places):
         with lens_files(place) as found:
             if name is not None and (len(places) > 1 or len(found.files) != 1):
-                raise LensError(f"--name gives one lens its name, and {shown(place)} holds {len(found.files)} files")
+                raise ProjectError(f"--name gives one lens its name, and {shown(place)} holds {len(found.files)} files")
             for suffix, number in found.others.items():
                 others[suffix] = others.get(suffix, 0) + number
             kinds |= {file.suffix for file in found.files}
@@ -146,7 +147,7 @@ def add_lenses(
                         continue
                     text, record = _read(file, data, digest, reading)
                     made, said = names.put(text, record, name or file.stem, exact=name is not None)
-                except OutputError:
+                except (OutputError, ProjectError):
                     raise
                 except FlarewrightError as error:
                     refused.append(Refused(file.label, str(error)))
@@ -202,6 +203,8 @@ def _read(file: LensFile, data: bytes, digest: str, reading: _Reading) -> tuple[
 def _with_own_pictures(lens: Lens) -> Lens:
     """Copy the pictures of a lens to the library, and let the lens name the copies."""
     if lens.iris.mask is not None:
+        # a lens file can name any file: only pictures are copied
+        read_mask(lens.iris.mask)
         lens = lens.replace(iris=lens.iris.replace(mask=_own_picture(lens.iris.mask)))
     rows = []
     for row in lens.rows:
@@ -219,7 +222,8 @@ def _own_picture(path: str) -> str:
     digest = digest_of(path)
     if digest is None:
         raise LensError(f"the picture {shown(path)} cannot be read: check the path in the lens file")
-    name = f"{digest[:_PICTURE_DIGITS]}{Path(path).suffix.lower()}"
+    suffix = Path(path).suffix.lower()
+    name = digest[:_PICTURE_DIGITS] + (suffix if suffix[1:].isalnum() and len(suffix) < 9 else "")
     target = library_folder() / "images" / name
     if not target.exists():
         write_atomically(target, partial(copyfile, path))
@@ -260,7 +264,7 @@ class _Names:
                 if (there := self.name_of(record.digest)) is not None:
                     return None, there
                 if exact and key_of(base) in self._keys:
-                    raise LensError(f"the name {base} is taken: choose another --name")
+                    raise ProjectError(f"the name {base} is taken: choose another --name")
                 named = replace(record, name=unused_name(wanted, self._keys))
                 path = lenses_folder() / f"{named.name}.toml"
                 try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -18,6 +19,8 @@ from ..io.lens.own.folder import key_of, library_folder, own_lenses, spoken, wri
 from ..io.lens.own.index import Entry, read_index, write_index
 from ..io.lens.own.record import LensRecord, record_in
 from ..typing import Progress, Report
+
+_PICTURE = re.compile(r"\.\./images/([0-9a-f]{16}(?:\.\w{1,8})?)(?=\")")
 
 
 @dataclass(frozen=True)
@@ -130,10 +133,10 @@ def library_lock(folder: Path) -> Iterator[IO[bytes]]:
         with locked(folder / "library.lock") as file:
             yield file
             file.flush()
-    except PermissionError as error:
+    except OSError as error:
         raise OutputError(
             f"the lens library {folder} cannot be written ({(error.strerror or str(error)).lower()}): check its "
-            "permissions, or set FLAREWRIGHT_STATE to another folder"
+            "permissions and the free space, or set FLAREWRIGHT_STATE to another folder"
         ) from None
 
 
@@ -213,7 +216,8 @@ def _pictures_in(path: Path) -> set[str]:
         text = read_text(path, "a lens file")
     except FlarewrightError:
         return set()
-    return {part.partition('"')[0] for part in text.split("../images/")[1:]}
+    # any text of a lens can hold such a path: only names that the library gives are files of it
+    return set(_PICTURE.findall(text))
 
 
 __all__ = [

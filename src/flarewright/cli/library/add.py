@@ -69,7 +69,7 @@ def add(
             print(f"{record.name}: {record.title}, {record.file}")
             for remark in record.remarks:
                 print(f"  - {remark}")
-        for one in found.refused[:_LISTED]:
+        for one in found.refused[:_LISTED] if found.added or len(found.refused) > 1 else ():
             reason = one.reason if Path(one.file).name in one.reason else f"{one.file}: {one.reason}"
             print(f"flarewright: refused: {reason}", file=sys.stderr)
         if len(found.refused) > _LISTED:
@@ -78,7 +78,9 @@ def add(
         print_remarks(found.remarks)
         print_remarks([_summary(len(found.added), len(found.known), len(found.refused), found.others)])
     if not found.added and not found.known:
-        if found.refused:
+        if len(found.refused) == 1:
+            print(f"flarewright: error: {found.refused[0].reason}", file=sys.stderr)
+        elif found.refused:
             print("flarewright: error: none of the files is a usable lens", file=sys.stderr)
         else:
             print("flarewright: error: there are no lens files: check the folder", file=sys.stderr)

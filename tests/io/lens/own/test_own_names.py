@@ -18,6 +18,8 @@ from flarewright.io.lens.own.search import Query, matching, parse_range
         ("Voigtländer Heliar", "voigtlander-heliar"),
         ("../../etc/passwd", "etc-passwd"),
         ("...", "lens"),
+        ("COM1", "lens-com1"),
+        ("NUL", "lens-nul"),
         ("株式会社", "lens"),
         ("a" * 500, "a" * LONGEST_NAME),
         ("word " * 40, "-".join(["word"] * 12)),

@@ -12,6 +12,9 @@ from flarewright.errors import OutputError
 
 from ...files.state_folder import state_folder
 
+# Windows has devices of these names, whatever follows a point
+_DEVICES = frozenset({"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))})
+
 LONGEST_NAME = 60
 """Largest number of characters of a name, without the number of a repeated one."""
 
@@ -95,7 +98,8 @@ def spoken(text: str) -> str:
     if len(plain) > LONGEST_NAME:
         # cut between words, unless a single word is too long
         plain = plain[:LONGEST_NAME].rpartition("-")[0] or plain[:LONGEST_NAME]
-    return plain.strip("-.") or "lens"
+    plain = plain.strip("-.") or "lens"
+    return f"lens-{plain}" if plain.partition(".")[0] in _DEVICES else plain
 
 
 def unused_name(text: str, taken: Container[str]) -> str:
