@@ -175,7 +175,8 @@ def _field_deg(raw: RawSequence, order: FirstOrder) -> float | None:
 
 def _remark_image(last: SequenceRow, order: FirstOrder, remarks: list[str]) -> None:
     gap = last.surface.thickness
-    if abs(gap - order.bfl) > IMAGE_OFF * order.efl:
+    # readers write 0 for a gap that the file leaves open, and report it
+    if gap != 0.0 and abs(gap - order.bfl) > IMAGE_OFF * order.efl:
         remarks.append(
             f"the file's image lies {gap:.2f} mm behind the last surface, {gap - order.bfl:+.2f} mm from the paraxial "
             f"focus ({order.bfl:.2f}); the sensor is placed at the focus"

@@ -91,6 +91,7 @@ def test_radii_glasses_opening_and_field(tmp_path):
     assert order.efl == pytest.approx(efl, rel=1e-9)
     assert order.entrance_pupil_diameter == pytest.approx(25.0)
     assert "the last gap is solved in the file; the sensor is placed at the paraxial focus" in found.remarks
+    assert not any("paraxial focus (" in remark for remark in found.remarks)
     assert "the configurations (CFG) are left out; the lens is that of the surfaces" in found.remarks
 
 
