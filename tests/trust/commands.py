@@ -36,6 +36,7 @@ ARGUMENTS: dict[str, tuple[str, ...]] = {
     "ghosts": ("tessar-brendel", "--light", "5,3", "--json"),
     "predict": ("tessar-brendel", "--samples", "5", "--quality", "draft", "--json"),
     "lenses": (),
+    "cameras": ("--json",),
     "gallery": ("-o", "gallery", "--size", "32x18"),
     "lens show": ("tessar-brendel", "--json"),
     "lens check": ("lens.toml", "--json"),

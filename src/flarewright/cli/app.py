@@ -23,8 +23,8 @@ from .design import identify as design_identify
 from .design import scratch as design_scratch
 from .design import solve as design_solve
 from .design import target as design_target
+from .lens import cameras, coating_list, coating_plot, lenses
 from .lens import check as lens_check
-from .lens import coating_list, coating_plot, lenses
 from .lens import convert as lens_convert
 from .lens import schema as lens_schema
 from .lens import show as lens_show
@@ -81,6 +81,7 @@ app.command("nuke-script", epilog=nuke.EPILOG)(nuke.nuke_script)
 app.command("ghosts", epilog=ghosts.EPILOG)(ghosts.ghosts)
 app.command("predict", epilog=predict.EPILOG)(predict.predict)
 app.command("lenses", epilog=lenses.EPILOG)(lenses.lenses)
+app.command("cameras", epilog=cameras.EPILOG)(cameras.cameras)
 app.command("gallery", epilog=gallery.EPILOG)(gallery.gallery)
 app.command("edit", epilog=edit.EPILOG)(edit.edit)
 app.command("warm-up", epilog=warm_up.EPILOG)(warm_up.warm_up)

@@ -66,17 +66,17 @@ def field_angles(text: str) -> tuple[float, float]:
     return angles
 
 
-def picture_size(text: str) -> tuple[int, int]:
-    """Return the width and height of `--size WxH` in pixels.
+def picture_size(text: str, flag: str = "--size") -> tuple[int, int]:
+    """Return the width and height of `--size WxH`, or of another flag, in pixels.
 
     Raises
     ------
     ProjectError
         When they are not whole numbers from 1 to 65536.
     """
-    width, height = pair(text, "--size", "1280x720", "x")
+    width, height = pair(text, flag, "1280x720", "x")
     if not (width.is_integer() and height.is_integer() and 1 <= width <= 65536 and 1 <= height <= 65536):
-        raise ProjectError(f"--size {text!r} is not two whole numbers of pixels up to 65536; write --size 1280x720")
+        raise ProjectError(f"{flag} {text!r} is not two whole numbers of pixels up to 65536; write {flag} 1280x720")
     return int(width), int(height)
 
 

@@ -18,6 +18,8 @@ The command line and other front ends call these functions; nothing here prints.
 - `project_files`: `open_project_files` opens all files of a project and collects the errors
 - `scene_check`: `camera_errors` and `light_errors` find the errors of a scene
 - `keyframes`: `project_at`, a project with the values of its keyframes and curves at a time
+- `light_places`: `lights_at_pixels` and `with_tracks`, lights whose places are given in pixels
+- `sun_place`: `sun_place`, where a camera sees the sun
 - `shot`: `shot` draws the frames of a moving project on all cores, with a `ShotResult`
 - `shot_frame`: `draw_frame`, one of them, and the digest of what made it
 - `nuke_script`: `nuke_script`, the text of a script or gizmo that composites a flare in Nuke

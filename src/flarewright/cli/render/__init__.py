@@ -4,6 +4,9 @@
 - `options`: the options of `render`, a record for each section of the help page
 - `project_flags`: `build_project` converts options to a project
 - `look_flags`: `--look`, and photographic defaults of library lenses
+- `framing`: `--sensor NAME`, `--crop` and `--overscan`
+- `tracks`: `--light-px` and `--track`, lights whose places are given in pixels
+- `sun_light`: `--sun`, the sun at a place and time
 - `art_flags`: options for overrides: `--rule`, `--solo`, `--mute`, `--gain`, `--physical`
 - `profile_table`: `--profile`, the table of what each ghost costs
 - `preview`: the PNG: options, exposure, file

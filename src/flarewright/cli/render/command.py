@@ -101,17 +101,32 @@ def render(options: RenderOptions) -> None:
 
 
 def project_of_options(
-    options: RenderOptions, state: ReferenceState | None
+    options: RenderOptions, state: ReferenceState | None, timeline: dict[str, Any] | None = None
 ) -> tuple[RenderOptions, Project, list[str]]:
-    """Build the project that the options ask for; return them with their look, the project and remarks."""
+    """Build the project that the options ask for; return them with their look, the project and remarks.
+
+    Parameters
+    ----------
+    options : RenderOptions
+    state : ReferenceState or None
+        Of a picture that resumes.
+    timeline : dict, optional
+        Of a shot: its frames per second and the number of its frame at 0 s, where they are given. Lights of
+        `--light-px` then stay at their pixels while the lens moves.
+    """
     if options.half and options.float32:
         raise ProjectError("--half and --float both set the bits per value; keep one")
     if options.float32 and options.compression == "dwaa":
         raise ProjectError("--compression dwaa keeps 16 bits of a value and --float writes 32; keep one")
+    from .framing import framed
     from .look_flags import photographed, put_look, settings_of
-    from .project_flags import build_project
+    from .project_flags import build_project, project_of
+    from .sun_light import sun_remark
+    from .tracks import given_tracks, placed, with_given_tracks
 
-    flags = replace(options, resumed=None if state is None else state.project)
+    _check_places(options, timeline)
+    tracked = given_tracks(options, 1 if timeline is None else timeline.get("start", 1))
+    flags = replace(options, resumed=None if state is None else state.project, tracked=tracked)
     given, plain = settings_of(flags), options.ideal or options.project is not None or state is not None
     remarks: list[str] = []
     if options.look is not None:
@@ -121,10 +136,42 @@ def project_of_options(
     if not plain:
         settings, filled = photographed(settings, given)
         remarks = [*filled, *remarks]
+    settings, counted_px, framing = framed(settings, options)
+    remarks += [*framing, *sun_remark(options)]
+    if timeline:
+        settings = project_of({**dict(settings), "timeline": {**dict(settings.timeline), **timeline}})
+    if flags.tracked:
+        settings, found = with_given_tracks(
+            settings, flags, counted_px, fps_given="fps" in (timeline or {}), start_given="start" in (timeline or {})
+        )
+        remarks += found
     if options.frame is not None or options.at_s is not None:
         settings, moment = _at_moment(settings, options)
         remarks = [moment, *remarks]
+    if options.light_px:
+        settings, found = placed(settings, options, len(options.light), counted_px, over_time=timeline is not None)
+        remarks += found
     return flags, settings, remarks
+
+
+def _check_places(options: RenderOptions, timeline: dict[str, Any] | None) -> None:
+    """Raise an error for options on places of lights that have no effect together."""
+    from .sun_light import check_aim
+    from .tracks import px_origin
+
+    check_aim(options)
+    px_origin(options.px_origin)
+    if options.px_origin is not None and not (options.light_px or options.track):
+        raise ProjectError("--px-origin is the corner of --light-px and --track; add one of them, or leave it out")
+    if options.track and timeline is None and options.frame is None and options.at_s is None:
+        raise ProjectError("--track is the path of a light over time: add --frame N, or draw all with flarewright shot")
+    if options.resume is not None:
+        for flag, value in (
+            ("--light-px", options.light_px), ("--track", options.track), ("--sun", options.sun),
+            ("--crop", options.crop), ("--overscan", options.overscan),
+        ):  # fmt: skip
+            if value:
+                raise ProjectError(f"--resume continues a picture with its settings; omit {flag}")
 
 
 def _at_moment(project: Project, options: RenderOptions) -> tuple[Project, str]:

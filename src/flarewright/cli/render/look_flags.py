@@ -12,7 +12,7 @@ from ...model import Light, Project
 from ...render.scene.looks import look_keys, with_look
 from ...render.scene.photographic_defaults import as_photographed
 from .options.record import RenderOptions
-from .project_flags import parsed_light
+from .project_flags import flag_lights
 
 __all__ = ["put_look", "settings_of"]
 
@@ -47,19 +47,29 @@ def put_look(flags: RenderOptions, name: str) -> tuple[RenderOptions, frozenset[
     lens = stage.lens if flags.lens is None else flags.lens
     if isinstance(lens, str) and is_ghost_model_file(lens):
         raise ProjectError(f"{lens} is a measured flare and has the look of its lens; omit --look")
-    lights = tuple(Light.model_validate(parsed_light(text)) for text in flags.light) or stage.lights
+    lights = tuple(Light.model_validate(fields) for fields in flag_lights(flags)) or stage.lights
     if base is None:
         zoom = stage.zoom if flags.lens is None else None
         shot = Project(lens=lens, lights=lights, zoom=zoom)
     else:
         shot = base.replace(lens=lens, lights=lights)
     found, remarks = with_look(shot, look)
-    return replace(flags, lens=None, light=[], project=None, resumed=found), look_keys(look), remarks
+    return (
+        replace(flags, lens=None, light=[], light_px=[], sun=None, project=None, resumed=found),
+        look_keys(look),
+        remarks,
+    )
 
 
 def settings_of(flags: RenderOptions) -> frozenset[str]:
     """Return the settings of flags for a library lens, for `photographic_defaults.as_photographed`."""
-    sizes = (flags.light_diameter, flags.light_size, flags.light_polygon, any("@" in text for text in flags.light))
+    sizes = (
+        flags.light_diameter,
+        flags.light_size,
+        flags.light_polygon,
+        flags.sun,
+        any("@" in text for text in (*flags.light, *flags.light_px)),
+    )
     given = {
         "f_number": flags.fstop is not None,
         "coating": flags.coating is not None,

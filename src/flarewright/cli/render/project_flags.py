@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from ...errors import ProjectError
 from ...io.lens.coating_text import parse_coating_choice
 from ...io.lens.plate_text import parse_grating, parse_imperfection, parse_plate
+from ...io.project.camera_list import is_camera_name
 from ...io.project.project_file import ProjectFileError, read_project, validation_messages
 from ...io.project.spectrum_text import parse_spectrum
 from ...model import Art, Holdout, Iris, Lens, Light, Project, ProjectCurve, Scatter
@@ -18,6 +19,8 @@ from ...model.project.light import SUN_DEG
 from ..common import field_angles, pair
 from .art_flags import art_flags
 from .options.record import RenderOptions
+from .sun_light import sun_field
+from .tracks import pixel_place, placeholder_lights
 
 # Flag of each key of a project file, for error messages.
 _FLAG_OF = {
@@ -90,7 +93,7 @@ def build_project(flags: RenderOptions) -> Project:
     base = read_project(flags.project) if flags.project is not None else flags.resumed
     if base is None and flags.lens is None:
         raise ProjectError("no lens is given; name one (flarewright lenses lists them) or give a --project file")
-    if base is None and not flags.light:
+    if base is None and not (flags.light or flags.light_px or flags.sun or flags.tracked):
         raise ProjectError("no light is given; give its place in degrees by --light X,Y, for example --light 10,5")
     fields: dict[str, Any] = {name: getattr(base, name) for name in Project.model_fields} if base else {}
     if flags.lens is not None:
@@ -206,7 +209,9 @@ def _sections(flags: RenderOptions) -> dict[str, dict[str, Any]]:
     dirt_image = None if flags.dirt_image is None else str(flags.dirt_image)
     if dirt_image is not None and not Path(dirt_image).is_file():
         raise ProjectError(f"--dirt-image {dirt_image} {_no_file(dirt_image)}; give a grey PNG or EXR image")
-    sensor = None if flags.sensor is None else pair(flags.sensor, "--sensor", "36x24 (mm)", "x")
+    # a camera's name is resolved in `framing`, which also needs the size of the picture
+    stated = flags.sensor is not None and not is_camera_name(flags.sensor)
+    sensor = pair(flags.sensor or "", "--sensor", "36x24 (mm)", "x") if stated else None
     return {
         "camera": {
             "size_px": size,
@@ -258,7 +263,7 @@ def _sections(flags: RenderOptions) -> dict[str, dict[str, Any]]:
 
 def _lights(flags: RenderOptions, base: tuple[Light, ...]) -> list[dict[str, Any]]:
     """Return the lights: those of the flags, else those of the project, with intensities and spectra of the flags."""
-    lights = [parsed_light(text) for text in flags.light] if flags.light else [dict(light) for light in base]
+    lights = placeholder_lights(flags, flag_lights(flags) or [dict(light) for light in base])
     spectra = [parse_spectrum(text) for text in flags.spectrum]
     for name, values in (
         ("intensity", flags.intensity),
@@ -301,7 +306,8 @@ def _extents(flags: RenderOptions, lights: list[dict[str, Any]]) -> None:
             "lights of several kinds"
         )
     _share_out("--light-diameter", [{"diameter_deg": angle, "shape": None} for angle in flags.light_diameter], lights)
-    suns = [light for light in lights if flags.light and light.get("name") == "sun"]
+    given_here = flags.light or flags.light_px or flags.sun
+    suns = [light for light in lights if given_here and light.get("name") == "sun"]
     rest = [light for light in lights if light not in suns]
     for flag, values in shapes.items():
         if values and not rest:
@@ -309,15 +315,40 @@ def _extents(flags: RenderOptions, lights: list[dict[str, Any]]) -> None:
         _share_out(flag, [{"shape": shape, "diameter_deg": 0.0} for shape in values], rest, others=bool(suns))
 
 
+def flag_lights(flags: RenderOptions) -> list[dict[str, Any]]:
+    """Return the lights of `--light`, `--light-px` and `--sun`, in this order.
+
+    Those of `--light-px` are on the axis: their place follows from the project (`tracks.placed`).
+    """
+    lights = [parsed_light(text) for text in flags.light]
+    for text in flags.light_px:
+        pixel_place(text)
+        lights.append({**_word_of(text, "--light-px", "640,360"), "field_deg": (0.0, 0.0)})
+    if flags.sun is not None:
+        lights.append({"field_deg": sun_field(flags).field_deg, **_SUN})
+    return lights
+
+
+_SUN: dict[str, Any] = {"name": "sun", "diameter_deg": SUN_DEG}
+
+
 def parsed_light(text: str) -> dict[str, Any]:
     """Return the fields of a light from `--light`, X,Y or sun@X,Y."""
-    word, at, place = text.rpartition("@")
+    found = _word_of(text, "--light", "10,5")
+    return {"field_deg": field_angles(text.rpartition("@")[2]), **found}
+
+
+def _word_of(text: str, flag: str, example: str) -> dict[str, Any]:
+    """Return the fields of a light that the word before its place sets."""
+    word, at, _ = text.rpartition("@")
     if at and word.strip().lower() != "sun":
-        raise ProjectError(f"--light {text!r}: there is no {word.strip()!r}; write --light 10,5 or --light sun@10,5")
+        raise ProjectError(
+            f"{flag} {text!r}: there is no {word.strip()!r}; write {flag} {example} or {flag} sun@{example}"
+        )
     if text.strip().lower() == "sun":
-        raise ProjectError("--light sun has no place; write --light sun@10,5 (degrees right and up)")
-    found: dict[str, Any] = {"field_deg": field_angles(place)}
-    return {**found, "name": "sun", "diameter_deg": SUN_DEG} if at else found
+        unit = "degrees right and up" if flag == "--light" else "pixels"
+        raise ProjectError(f"{flag} sun has no place; write {flag} sun@{example} ({unit})")
+    return dict(_SUN) if at else {}
 
 
 def _size(text: str) -> tuple[float, float]:

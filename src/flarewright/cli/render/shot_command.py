@@ -97,17 +97,12 @@ def _parts(text: str | None) -> Literal["multi", "single"]:
 
 def _project(options: ShotOptions) -> tuple[Project, list[str]]:
     """Return the project of the options, with their timeline, and remarks."""
-    from .project_flags import project_of
-
     names = {each.name for each in fields(RenderOptions)} & {each.name for each in fields(ShotOptions)}
     # a render's shutter exposes its PNG
     same = {name: getattr(options, name) for name in names - {"output", "shutter"}}
-    _, project, remarks = project_of_options(RenderOptions(**same, output=Path(options.output)), None)
-    changed = {key: value for key, value in (("fps", options.fps), ("start", options.start)) if value is not None}
-    if not changed:
-        return project, remarks
-    timeline = {**dict(project.timeline), **changed}
-    return project_of({**dict(project), "timeline": timeline}), remarks
+    timeline = {key: value for key, value in (("fps", options.fps), ("start", options.start)) if value is not None}
+    _, project, remarks = project_of_options(RenderOptions(**same, output=Path(options.output)), None, timeline)
+    return project, remarks
 
 
 def _files(pattern: FramePattern, project: Project, frames: str | None) -> list[Path]:

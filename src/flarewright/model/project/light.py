@@ -164,7 +164,8 @@ class Light(Frozen):
     diameter_deg: float = Field(0.0, ge=0.0, le=60.0)
     shape: Shape | None = None
     holdout: Holdout | None = None
-    keyframes: tuple[LightKey, ...] = Field((), max_length=1000)
+    # as many as a curve has: one a frame of a long track
+    keyframes: tuple[LightKey, ...] = Field((), max_length=10000)
     motion: Motion = "linear"
     curves: tuple[LightCurve, ...] = ()
 

@@ -14,6 +14,7 @@ Modules:
 - `path_color`: `traced_spectrum`, `direct_flux`: colours of paths between the traced wavelengths
 - `paraxial_place`: `ghost_frame`: position and size of a ghost from matrices
 - `direct_image`: `direct_image`, `defocus_mm`, `traced_pupil`: the direct image of a light
+- `pixel_place`: `field_angles_at`: the field angles whose direct image lies at a pixel
 - `art_rules`: `resolve_art`: art direction as overrides per path and per pass
 - `looks`: `with_look`, `look_of`, `demonstration`: apply a look to a project, or extract it from one
 - `photographic_defaults`: `as_photographed`: plausible settings for lenses of the library

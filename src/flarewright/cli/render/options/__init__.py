@@ -1,6 +1,7 @@
 """The options of `flarewright render` and `flarewright shot`, a record for each section of their help pages.
 
 - `light`: the lights, and what hides them
+- `place`: lights in pixels, tracks, the sun
 - `lens`: the lens: aperture, iris, coating, scatter, zoom, filters
 - `camera`: the sensor and the picture
 - `quality`: how the picture is computed

@@ -44,7 +44,23 @@ class CameraOptions:
     ] = None
     sensor: Annotated[
         str | None,
-        typer.Option(metavar="WxH", help="Sensor in mm (default: 36 wide, square pixels).", rich_help_panel=PANEL),
+        typer.Option(
+            metavar="WxH|CAMERA",
+            help="Sensor in mm (default: 36 wide, square pixels), or one of `flarewright cameras`.",
+            rich_help_panel=PANEL,
+        ),
+    ] = None
+    crop: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WxH|P%", help="Middle of the picture that stays, in pixels or percent.", rich_help_panel=PANEL
+        ),
+    ] = None
+    overscan: Annotated[
+        str | None,
+        typer.Option(
+            metavar="P%|PX", help="Part or pixels (on each side) drawn around the picture.", rich_help_panel=PANEL
+        ),
     ] = None
     sensor_distance: Annotated[
         float | None,

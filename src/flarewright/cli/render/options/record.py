@@ -11,6 +11,7 @@ from .inputs import InputOptions
 from .lens import LensOptions
 from .light import LightOptions
 from .output import OutputOptions
+from .place import PlaceOptions
 from .quality import QualityOptions
 from .reference import ReferenceOptions
 from .starburst import StarburstOptions
@@ -24,6 +25,7 @@ class RenderOptions(
     ArtOptions,
     StarburstOptions,
     LensOptions,
+    PlaceOptions,
     LightOptions,
     InputOptions,
     OutputOptions,
@@ -32,3 +34,5 @@ class RenderOptions(
 
     resumed: Any = None
     """The `Project` of a picture that resumes, or one that a look has made; help does not load its type."""
+    tracked: Any = ()
+    """Tracks of `--track` (`cli.render.tracks.GivenTrack`)."""

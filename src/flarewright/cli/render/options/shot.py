@@ -13,6 +13,7 @@ from .camera import CameraOptions
 from .layers import PANEL, LayerOptions
 from .lens import LensOptions
 from .light import LightOptions
+from .place import PlaceOptions
 from .quality import QualityOptions
 from .starburst import StarburstOptions
 
@@ -100,7 +101,15 @@ class ShotOutput(LayerOptions, ShotFiles):
 
 @dataclass(frozen=True, kw_only=True)
 class ShotOptions(
-    QualityOptions, CameraOptions, ArtOptions, StarburstOptions, LensOptions, LightOptions, ShotOutput, ShotInputs
+    QualityOptions,
+    CameraOptions,
+    ArtOptions,
+    StarburstOptions,
+    LensOptions,
+    PlaceOptions,
+    LightOptions,
+    ShotOutput,
+    ShotInputs,
 ):
     """The options as given; the last base comes first on the help page."""
 
