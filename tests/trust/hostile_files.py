@@ -40,6 +40,12 @@ READERS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("warm.toml", ("looks", "save", "warm.toml", "-o", "new.toml")),
     ("look.toml", (*RENDER, "--look", "look.toml")),
     ("spectrum.csv", (*RENDER, "--spectrum", "spectrum.csv")),
+    ("track.csv", (*RENDER, "--track", "track.csv", "--frame", "2")),
+    ("track.nk", (*RENDER, "--track", "track.nk", "--frame", "2")),
+    ("effects.txt", (*RENDER, "--track", "effects.txt", "--frame", "2")),
+    ("paths.txt", (*RENDER, "--track", "paths.txt", "--frame", "2")),
+    ("points.txt", (*RENDER, "--track", "points.txt", "--frame", "2")),
+    ("scene.json", (*RENDER, "--track", "scene.json", "--frame", "2")),
     ("iris.png", (*RENDER, "--iris-image", "iris.png")),
     ("dirt.png", (*RENDER, "--dirt-image", "dirt.png")),
     ("matte.png", (*RENDER, "--holdout", "matte.png")),
@@ -160,6 +166,29 @@ stop,2,,,10,
 flat,4,1.5,60,12,
 -50,100,,,12,1e-7
 """
+TRACKS = {
+    "track.csv": "frame,x,y,intensity,r,g,b\n1,5,5,1,1,1,1\n2,9,7,2,1,0.5,0.2\n3,12,8,1,1,1,1\n",
+    "track.nk": (
+        "Tracker4 {\n tracks { { 1 31 1 }\n"
+        "{ { 5 1 20 enable e 1 }\n{ 3 1 75 name name 1 }\n{ 2 1 58 track_x track_x 1 }"
+        "\n{ 2 1 58 track_y track_y 1 }\n}\n{\n { {curve K x1 1} \"a\" {curve x1 5 9 x4 12} "
+        "{curve x1 5 7 0x41000000} }\n}\n}\n}\n"
+    ),
+    "effects.txt": (
+        "Adobe After Effects 8.0 Keyframe Data\n\n\tUnits Per Second\t24\n\tSource Width\t64\n\tSource Height\t36\n"
+        "\nMotion Trackers\tA\tB\tAttach Point\n\tFrame\tX pixels\tY pixels\n\t1\t5\t5\n\t2\t9\t7\n"
+        "\nEnd of Keyframe Data\n"
+    ),
+    "paths.txt": "Tracker1 1 -0.5 0.25 30\nTracker1 2 -0.25 0.5 30\nTracker2 2 0 0 30\n",
+    "points.txt": "2\na\n0\n2\n1 5.0 5.0\n2 9.0 7.0\nb\n1\n1\n2 1.0 2.0\n",
+    "scene.json": (
+        '{"format": "flarewright-scene", "version": 1, "fps": 24, "camera": {"frames": [{"frame": 1, "focal_mm": 90, '
+        '"sensor_mm": [36, 20.25], "matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,5],[0,0,0,1]]}]}, "lights": [{"name": "a", '
+        '"kind": "point", "radius": 0.1, "frames": [{"frame": 1, "rgb": [1, 1, 0.5], "matrix": '
+        '[[1,0,0,0.1],[0,1,0,0.1],[0,0,1,0],[0,0,0,1]]}, {"frame": 2, "rgb": [1, 1, 0.5], "matrix": '
+        '[[1,0,0,0.2],[0,1,0,0.1],[0,0,1,0],[0,0,0,1]]}]}]}'
+    ),
+}  # fmt: skip
 PBRT = "# A plano-convex lens\n0 2 0 20\n1e9 4 1.5 24\n-50 100 1 24\n"
 REALFLARE = """\
 {"name": "A lens", "focal_length": 100, "fstop": 5, "aperture_index": 0, "lens_elements": [
@@ -209,6 +238,8 @@ def _more(folder: Path) -> None:
     (folder / "lens.zmx").write_text(ZEMAX, "utf-8")
     for name, text in (("seq", CODEV), ("len", OSLO), ("csv", TABLE), ("dat", PBRT), ("json", REALFLARE)):
         (folder / f"lens.{name}").write_text(text, "utf-8")
+    for name, text in TRACKS.items():
+        (folder / name).write_text(text, "utf-8")
     (folder / "look.toml").write_text(LOOK, "utf-8")
     (folder / "spectrum.csv").write_text("400,1\n500,2\n600,1.5\n700,1\n", "utf-8")
     y, x = np.mgrid[:24, :24] - 11.5

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import ProjectError
 from ..model import Light, LightCurve, LightKey, Project
+from ..model.project.animation import FIRST_FRAME, LAST_FRAME, LAST_S
 from ..typing import Floats
 from .keyframes import frame_rate, is_still, length_s, light_at, project_at, still, time_of
 
@@ -187,7 +188,8 @@ def assigned(names: Sequence[str], wanted: Sequence[str | int | None], lights: S
     for name, want in zip(names, wanted, strict=True):
         if isinstance(want, int):
             if not 0 <= want < len(lights):
-                raise ProjectError(f"--track: there is no light {want}; the lights are 0 to {len(lights) - 1}")
+                known_ones = f"the lights are 0 to {len(lights) - 1}" if lights else "no light is given"
+                raise ProjectError(f"--track: there is no light {want}: {known_ones}; give another index, or new")
             found.append(want)
         elif want is not None and want != "new":
             if known.count(want.lower()) != 1:
@@ -228,10 +230,18 @@ def timeline_of_tracks(
     -------
     project : Project
     remarks : list of str
+
+    Raises
+    ------
+    ProjectError
+        A track states frames per second or a first frame that no shot has.
     """
     timeline, remarks = project.timeline, []
     resting = is_still(project)
     stated = {file.fps for file in files if file.fps is not None}
+    wrong = next((fps for fps in stated if not 0.01 <= fps <= 1000.0), None)
+    if wrong is not None:
+        raise ProjectError(f"the track states {wrong:g} frames per second; correct it, 0.01 to 1000 are possible")
     if len(stated) == 1 and (fps := stated.pop()) != timeline.fps:
         if resting and not fps_given:
             timeline = timeline.replace(fps=fps)
@@ -242,6 +252,8 @@ def timeline_of_tracks(
             )
     first = int(np.floor(min(float(track.frames[0]) for file in files for track in file.tracks)))
     if first != timeline.start and resting and not start_given:
+        if not FIRST_FRAME <= first <= LAST_FRAME:
+            raise ProjectError(f"a track begins at frame {first}; frames are {FIRST_FRAME} to {LAST_FRAME}")
         timeline = timeline.replace(start=first)
         remarks.append(f"the shot begins with frame {first}, the first of its tracks; --start sets another one")
     return project.replace(timeline=timeline), remarks
@@ -354,6 +366,12 @@ def _check_times(track: Track, project: Project) -> None:
         raise ProjectError(
             f"track {track.name!r} begins at frame {first:g}, before frame {start} at 0 s; give --start {first:.0f}, "
             f"or --track-offset {start - first:.0f} if its frames have other numbers"
+        )
+    last_s = time_of(float(track.frames[-1]), project.timeline)
+    if last_s > LAST_S:
+        raise ProjectError(
+            f"track {track.name!r} ends at frame {track.frames[-1]:g}, {last_s:g} s after frame {start}; a shot has at "
+            f"most {LAST_S:g} s, so check its frames"
         )
 
 

@@ -118,11 +118,12 @@ def project_of_options(
         raise ProjectError("--half and --float both set the bits per value; keep one")
     if options.float32 and options.compression == "dwaa":
         raise ProjectError("--compression dwaa keeps 16 bits of a value and --float writes 32; keep one")
+    from ...io.project.project_file import read_project
     from .framing import framed
     from .look_flags import photographed, put_look, settings_of
-    from .project_flags import build_project, project_of
+    from .project_flags import build_project, known_lights, project_of
     from .sun_light import sun_remark
-    from .tracks import given_tracks, placed, with_given_tracks
+    from .tracks import given_tracks, placed, with_given_tracks, with_lights
 
     _check_places(options, timeline)
     tracked = given_tracks(options, 1 if timeline is None else timeline.get("start", 1))
@@ -132,6 +133,10 @@ def project_of_options(
     if options.look is not None:
         flags, of_look, unfit = put_look(flags, options.look)
         given, remarks = given | of_look, list(unfit)
+    if flags.tracked:
+        base = read_project(flags.project) if flags.project is not None else flags.resumed
+        known = known_lights(flags, base.lights if base is not None else ())
+        flags = replace(flags, tracked=with_lights(flags.tracked, [light.get("name", "light") for light in known]))
     settings = build_project(flags)
     if not plain:
         settings, filled = photographed(settings, given)

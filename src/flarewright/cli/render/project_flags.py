@@ -20,7 +20,7 @@ from ..common import field_angles, pair
 from .art_flags import art_flags
 from .options.record import RenderOptions
 from .sun_light import sun_field
-from .tracks import pixel_place, placeholder_lights
+from .tracks import pixel_place, with_new_lights
 
 # Flag of each key of a project file, for error messages.
 _FLAG_OF = {
@@ -263,7 +263,7 @@ def _sections(flags: RenderOptions) -> dict[str, dict[str, Any]]:
 
 def _lights(flags: RenderOptions, base: tuple[Light, ...]) -> list[dict[str, Any]]:
     """Return the lights: those of the flags, else those of the project, with intensities and spectra of the flags."""
-    lights = placeholder_lights(flags, flag_lights(flags) or [dict(light) for light in base])
+    lights = with_new_lights(flags.tracked, known_lights(flags, base))
     spectra = [parse_spectrum(text) for text in flags.spectrum]
     for name, values in (
         ("intensity", flags.intensity),
@@ -322,11 +322,16 @@ def flag_lights(flags: RenderOptions) -> list[dict[str, Any]]:
     """
     lights = [parsed_light(text) for text in flags.light]
     for text in flags.light_px:
+        lights.append({"field_deg": (0.0, 0.0), **_word_of(text, "--light-px", "640,360")})
         pixel_place(text)
-        lights.append({**_word_of(text, "--light-px", "640,360"), "field_deg": (0.0, 0.0)})
     if flags.sun is not None:
         lights.append({"field_deg": sun_field(flags).field_deg, **_SUN})
     return lights
+
+
+def known_lights(flags: RenderOptions, base: tuple[Light, ...]) -> list[dict[str, Any]]:
+    """Return the lights of the flags, else those of the project."""
+    return flag_lights(flags) or [dict(light) for light in base]
 
 
 _SUN: dict[str, Any] = {"name": "sun", "diameter_deg": SUN_DEG}

@@ -10,11 +10,16 @@ from ...errors import ProjectError
 from ..common import first_run_bar, one_bar, pair, picture_size, print_remarks
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ...io.tracks.track import Origin, Track, TrackFile
     from ...model import Project
     from .options.record import RenderOptions
 
-__all__ = ["GivenTrack", "given_tracks", "pixel_place", "placed", "px_origin", "track_files", "with_given_tracks"]
+__all__ = [
+    "GivenTrack", "given_tracks", "pixel_place", "placed", "px_origin", "track_files", "with_given_tracks",
+    "with_lights", "with_new_lights",
+]  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,11 +32,14 @@ class GivenTrack:
     light : str or int or None
         Name or index of a light, "new", or None: by the track's name and order.
     file : TrackFile
+    index : int
+        Of the light that it moves (`with_lights`); one more than there are for a new light.
     """
 
     track: Track
     light: str | int | None
     file: TrackFile
+    index: int = -1
 
 
 def px_origin(text: str | None) -> Origin | None:
@@ -120,19 +128,17 @@ def with_given_tracks(
     start_given: bool = False,
 ) -> tuple[Project, list[str]]:
     """Return a project whose lights follow the tracks of the flags, and remarks."""
-    from ...workflow.light_places import assigned, timeline_of_tracks, with_tracks
+    from ...workflow.light_places import timeline_of_tracks, with_tracks
 
     given: tuple[GivenTrack, ...] = flags.tracked
     files = track_files(given)
     shifted = [replace(file, tracks=tuple(one.track for one in given if one.file is file)) for file in files]
     project, remarks = timeline_of_tracks(project, shifted, fps_given=fps_given, start_given=start_given)
-    names = [light.name for light in project.lights]
-    moves = assigned([one.track.name for one in given], [one.light for one in given], names)
     keep = {"intensity": bool(flags.intensity), "rgb": bool(flags.spectrum)}
     compile_places(project)
     with one_bar("tracks") as progress:
         project, found = with_tracks(
-            project, tuple(zip(moves, (one.track for one in given), strict=True)), counted_px=counted_px,
+            project, tuple((one.index, one.track) for one in given), counted_px=counted_px,
             keep=frozenset(name for name, kept in keep.items() if kept), progress=progress,
         )  # fmt: skip
     return project, [*(line for file in files for line in file.remarks), *remarks, *found]
@@ -176,14 +182,22 @@ def compile_places(project: Project) -> None:
         compile_for_render(project, None, lambda sentence: print_remarks([sentence]), first_run_bar)
 
 
-def placeholder_lights(flags: RenderOptions, known: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the lights with one more for each track that moves none of them; its place follows from the track."""
-    if not flags.tracked:
-        return known
+def with_lights(given: tuple[GivenTrack, ...], names: Sequence[str]) -> tuple[GivenTrack, ...]:
+    """Return tracks with the index of the light that each moves.
+
+    Parameters
+    ----------
+    given : tuple of GivenTrack
+    names : sequence of str
+        Names of the lights without the new ones of tracks.
+    """
     from ...workflow.light_places import assigned
 
-    given: tuple[GivenTrack, ...] = flags.tracked
-    names = [str(light.get("name", "light")) for light in known]
     moves = assigned([one.track.name for one in given], [one.light for one in given], names)
-    new = {index: one.track.name for index, one in zip(moves, given, strict=True) if index >= len(known)}
+    return tuple(replace(one, index=index) for one, index in zip(given, moves, strict=True))
+
+
+def with_new_lights(given: tuple[GivenTrack, ...], known: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the lights with one more for each track that moves none of them; its place follows from the track."""
+    new = {one.index: one.track.name for one in given if one.index >= len(known)}
     return [*known, *({"field_deg": (0.0, 0.0), "name": new[index]} for index in sorted(new))]

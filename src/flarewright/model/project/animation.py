@@ -15,6 +15,8 @@ Motion = Literal["linear", "smooth"]
 
 LAST_S = 86400.0
 """Latest time of a key, seconds."""
+FIRST_FRAME, LAST_FRAME = -1_000_000, 10_000_000
+"""Least and largest number of the frame at 0 s."""
 LARGEST_INTENSITY = 1e20
 """Largest intensity of a light: above that of every light, and its products stay within 32-bit floats."""
 
@@ -117,7 +119,7 @@ class Timeline(Frozen):
     """
 
     fps: float = Field(24.0, ge=0.01, le=1000.0)
-    start: int = Field(1, ge=-1_000_000, le=10_000_000)
+    start: int = Field(1, ge=FIRST_FRAME, le=LAST_FRAME)
 
 
 def rising(at_s: tuple[float, ...]) -> tuple[float, ...]:
