@@ -89,6 +89,26 @@ def test_a_camera_by_name_gives_its_area_its_pixels_and_a_part_for_other_proport
     assert len(listed) == len(camera_formats()) > 25
 
 
+def test_the_ghosts_of_a_light_at_a_pixel_and_a_project_that_begins_with_one(folder, capsys):
+    """The pixel against the centroid that the ghost table traces, at the same wavelength within lateral colour."""
+    words = ["--light-px", "48.5,8.5", "--size", "64x36", "--sensor", "super-16", "--fstop", "16"]
+    assert run(["ghosts", LENS, *words, "--json"]) == 0
+    x, y = json.loads(capsys.readouterr().out)["direct"]["centroid_mm"]
+    pitch = 12.52 / 64
+    assert (32.0 + x / pitch, 18.0 - y / pitch) == pytest.approx((48.5, 8.5), abs=0.05)
+    assert run(["project", "init", LENS, "--light-px", "640,180", "-o", "new.toml"]) == 0
+    light = tomllib.loads((folder / "new.toml").read_text())["lights"][0]
+    assert light["field_deg"][0] == pytest.approx(0.0, abs=1e-3)
+    assert light["field_deg"][1] > 1.0
+    for wrong in (
+        ["ghosts", LENS, "--light", "1,1", "--size", "64x36"],
+        ["ghosts", LENS],
+        ["ghosts", LENS, "--light", "1,1", "--light-px", "1,1"],
+        ["project", "init", LENS, "--light", "1,1", "--light-px", "1,1"],
+    ):
+        assert run(wrong) == 2
+
+
 def test_pixels_of_known_cameras_are_square_and_have_sources():
     for camera in camera_formats():
         assert len(camera.source) > 10

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ...errors import ProjectError
 from ..common import check_free, check_place, field_angles, print_remarks, write_text
+from ..render.tracks import compile_places, pixel_place
 
 if TYPE_CHECKING:
     from ...model import Light, Project
@@ -24,11 +26,19 @@ def init(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="The project file, *.toml (default: stdout).")
     ] = None,
-    light: Annotated[str, typer.Option(metavar="X,Y", help="The first light, degrees right and up.")] = "10,5",
+    light: Annotated[
+        str | None, typer.Option(metavar="X,Y", help="The first light, degrees right and up (default: 10,5).")
+    ] = None,
+    light_px: Annotated[
+        str | None, typer.Option(metavar="X,Y", help="Instead: its pixel from the top left corner of the picture.")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
 ) -> None:
     """Write a project file with every setting, its default and a comment."""
-    angles = field_angles(light)
+    if light is not None and light_px is not None:
+        raise ProjectError("--light and --light-px both place the first light; keep one")
+    angles = field_angles("10,5" if light is None else light) if light_px is None else (0.0, 0.0)
+    place = None if light_px is None else pixel_place(light_px)
     if output is not None:
         check_place(output, ".toml")
         check_free(output, force)
@@ -38,6 +48,11 @@ def init(
 
     here = Light(field_deg=angles)
     project, remarks = (_measured(lens, here), ()) if is_ghost_model_file(lens) else _of_lens(lens, here)
+    if place is not None:
+        from ...workflow.light_places import lights_at_pixels
+
+        compile_places(project)
+        project = lights_at_pixels(project, {0: place})
     text = project_text(project, folder=output.parent if output else None, comments=True)
     if output is None:
         print(text, end="")

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ...model import Camera, Project
     from .options.record import RenderOptions
 
-__all__ = ["framed"]
+__all__ = ["framed", "on_sensor"]
 
 # width of a picture of film, which has no pixels of its own
 _FILM_WIDTH_PX = 1280
@@ -56,7 +56,7 @@ def framed(project: Project, flags: RenderOptions) -> tuple[Project, tuple[int, 
     if named:
         assert flags.sensor is not None
         fixed = flags.size is not None or flags.project is not None or flags.resumed is not None
-        camera, remarks = _on_sensor(camera, camera_format(flags.sensor), squeeze, fixed)
+        camera, remarks = on_sensor(camera, camera_format(flags.sensor), squeeze, fixed)
     if flags.crop is not None:
         size = _cropped(camera.size_px, flags.crop)
         camera = _resized(camera, size, squeeze)
@@ -81,8 +81,18 @@ def _squeeze(project: Project) -> float:
     return open_lens(project.lens).lens.squeeze or 1.0
 
 
-def _on_sensor(camera: Camera, known: CameraFormat, squeeze: float, fixed_size: bool) -> tuple[Camera, list[str]]:
-    """Return a camera on the largest part of a sensor that has the proportions of the picture, and remarks."""
+def on_sensor(camera: Camera, known: CameraFormat, squeeze: float, fixed_size: bool) -> tuple[Camera, list[str]]:
+    """Return a camera on the largest part of a sensor that has the proportions of the picture, and remarks.
+
+    Parameters
+    ----------
+    camera : Camera
+    known : CameraFormat
+    squeeze : float
+        Between picture and sensor, 1 for a picture that is not desqueezed.
+    fixed_size : bool
+        Whether the picture keeps its size; else it has the pixels of the sensor.
+    """
     across, down = known.sensor_mm
     size = camera.size_px
     if not fixed_size:

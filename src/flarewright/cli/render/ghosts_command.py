@@ -6,13 +6,22 @@ import csv
 import io
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ...errors import ProjectError
-from ..common import chosen_fstop, console, field_angles, first_run_bar, print_json, print_remarks
+from ..common import (
+    chosen_fstop,
+    console,
+    field_angles,
+    first_run_bar,
+    pair,
+    picture_size,
+    print_json,
+    print_remarks,
+)
 from ..option_record import with_options
 
 if TYPE_CHECKING:
@@ -33,7 +42,23 @@ class GhostsOptions:
     lens: Annotated[str, typer.Argument(metavar="LENS", help="A shipped lens (flarewright lenses) or a lens file.")]
     light: Annotated[
         list[str], typer.Option(metavar="X,Y", help="Field angles in degrees, right and up in the picture.")
-    ]
+    ] = field(default_factory=list)
+    light_px: Annotated[
+        list[str], typer.Option(metavar="X,Y", help="Instead: the pixel of its direct image in a picture of --size.")
+    ] = field(default_factory=list)
+    px_origin: Annotated[
+        str | None,
+        typer.Option(metavar="CORNER", help="Corner of --light-px: top-left (default) or bottom-left, as in Nuke."),
+    ] = None
+    size: Annotated[
+        str | None, typer.Option(metavar="WxH", help="With --light-px: picture in pixels (default: 1280x720).")
+    ] = None
+    sensor: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WxH|CAMERA", help="With --light-px: sensor in mm (default: 36 wide), or of `flarewright cameras`."
+        ),
+    ] = None
     distance: Annotated[
         float | None, typer.Option(help="Distance of the light in front of the lens, mm (default: inf).")
     ] = None
@@ -112,6 +137,8 @@ def ghosts(options: GhostsOptions) -> None:
     project = project_with(opened.lens)
     settled = resolve_project(project)
     compile_for_analysis(settled.lens, first_run_bar)
+    if options.light_px:
+        project = _at_pixel(project, options)
     light, quality, reflectance = project.lights[0], project.quality, options.sensor_reflectance
     query = GhostQuery(
         light.field_deg, light.distance, options.wavelength_nm, quality.paths,
@@ -148,9 +175,15 @@ def _project_of(options: GhostsOptions) -> Callable[[Lens], Project]:
     from ...io.lens.plate_text import parse_imperfection, parse_plate
     from .project_flags import project_of, scatter_flags
 
-    if len(options.light) > 1:
-        raise ProjectError(f"--light is given {len(options.light)} times; ghosts are listed for one light, so keep one")
-    angles, wavelength_nm = field_angles(options.light[0]), options.wavelength_nm
+    lights = [*options.light, *options.light_px]
+    if len(lights) > 1:
+        which = "--light and --light-px are" if options.light and options.light_px else "--light is"
+        which = which if options.light else "--light-px is"
+        raise ProjectError(f"{which} given {len(lights)} times; ghosts are listed for one light, so keep one")
+    if not lights:
+        raise ProjectError("no light is given; give its place in degrees by --light X,Y, for example --light 10,5")
+    angles = field_angles(options.light[0]) if options.light else (0.0, 0.0)
+    wavelength_nm = options.wavelength_nm
     if not (math.isfinite(wavelength_nm) and 380.0 <= wavelength_nm <= 780.0):
         raise ProjectError(f"--wavelength-nm {wavelength_nm:g} is not visible light; choose one between 380 and 780 nm")
     in_front, behind, imperfection = options.filter_plate, options.cover_glass, options.imperfection
@@ -163,6 +196,7 @@ def _project_of(options: GhostsOptions) -> Callable[[Lens], Project]:
             "sensor_reflectance": options.sensor_reflectance,
             "focus_distance": options.focus,
             "sensor_distance": options.sensor_distance,
+            **_picture(options),
         },
         "imperfection": None if imperfection is None else parse_imperfection(imperfection),
         "scatter": scatter_flags(options.scatter, options.surface_roughness, options.cleanliness),
@@ -178,6 +212,35 @@ def _project_of(options: GhostsOptions) -> Callable[[Lens], Project]:
     if settings["scatter"] is not None and not options.glare:
         raise ProjectError("--scatter, --surface-roughness and --cleanliness change the glare only; add --glare")
     return lambda lens: project_of({"lens": lens, **settings})
+
+
+def _picture(options: GhostsOptions) -> dict[str, Any]:
+    """Return the settings of the picture in which the pixel of a light counts."""
+    given = {"--px-origin": options.px_origin, "--size": options.size, "--sensor": options.sensor}
+    for flag, value in given.items():
+        if value is not None and not options.light_px:
+            raise ProjectError(f"{flag} is for the pixel of --light-px; add it, or leave {flag} out")
+    size = {} if options.size is None else {"size_px": picture_size(options.size)}
+    if options.sensor is None:
+        return size
+    from ...io.project.camera_list import camera_format, is_camera_name
+    from .framing import on_sensor
+
+    if not is_camera_name(options.sensor):
+        return {**size, "sensor_mm": pair(options.sensor, "--sensor", "36x24 (mm)", "x")}
+    from ...model import Camera
+
+    camera, _ = on_sensor(Camera.model_validate(size), camera_format(options.sensor), 1.0, bool(size))
+    return {"size_px": camera.size_px, "sensor_mm": camera.sensor_mm}
+
+
+def _at_pixel(project: Project, options: GhostsOptions) -> Project:
+    """Return a project whose light lies at the pixel of --light-px."""
+    from ...workflow.light_places import lights_at_pixels
+    from .tracks import from_top_left
+
+    size = project.camera.size_px
+    return lights_at_pixels(project, {0: from_top_left(options.light_px[0], options.px_origin, size[1])})
 
 
 def _check_sweep(options: GhostsOptions) -> None:

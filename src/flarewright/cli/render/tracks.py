@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from .options.record import RenderOptions
 
 __all__ = [
-    "GivenTrack", "given_tracks", "pixel_place", "placed", "px_origin", "track_files", "with_given_tracks",
-    "with_lights", "with_new_lights",
+    "GivenTrack", "from_top_left", "given_tracks", "pixel_place", "placed", "px_origin", "track_files",
+    "with_given_tracks", "with_lights", "with_new_lights",
 ]  # fmt: skip
 
 
@@ -56,6 +56,12 @@ def pixel_place(text: str, flag: str = "--light-px") -> tuple[float, float]:
     if max(abs(x), abs(y)) > 1e7:
         raise ProjectError(f"{flag} {text!r} lies beyond every picture; write {flag} 640,360 (pixels)")
     return x, y
+
+
+def from_top_left(text: str, origin: str | None, height_px: int) -> tuple[float, float]:
+    """Return the pixels of a `--light-px` from the top left corner of a picture; `origin` is `--px-origin`."""
+    x, y = pixel_place(text)
+    return x, height_px - y if px_origin(origin) == "bottom-left" else y
 
 
 def given_tracks(flags: RenderOptions, first_frame: int) -> tuple[GivenTrack, ...]:
@@ -162,10 +168,7 @@ def placed(
     """
     from ...workflow.light_places import lights_at_pixels, resting_tracks, with_tracks
 
-    places = {}
-    for k, text in enumerate(flags.light_px):
-        x, y = pixel_place(text)
-        places[first + k] = (x, counted_px[1] - y if px_origin(flags.px_origin) == "bottom-left" else y)
+    places = {first + k: from_top_left(text, flags.px_origin, counted_px[1]) for k, text in enumerate(flags.light_px)}
     compile_places(project)
     if over_time and (tracks := resting_tracks(project, places)):
         return with_tracks(project, tracks, counted_px=counted_px)[0], []

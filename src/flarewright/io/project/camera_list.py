@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import re
-import tomllib
 from functools import cache
 from importlib.resources import files
 
@@ -12,6 +11,7 @@ from pydantic import Field
 
 from ...errors import ProjectError
 from ...model.base import Frozen
+from ..files.text_file import read_toml
 
 __all__ = ["CameraFormat", "camera_format", "camera_formats", "is_camera_name"]
 
@@ -47,8 +47,8 @@ def camera_formats() -> tuple[CameraFormat, ...]:
     >>> camera_formats()[0].name
     'arri-alexa-35'
     """
-    text = files("flarewright").joinpath("io/data/cameras.toml").read_text(encoding="utf-8")
-    return tuple(CameraFormat.model_validate(entry) for entry in tomllib.loads(text)["cameras"])
+    data = read_toml(str(files("flarewright").joinpath("io/data/cameras.toml")), "the list of cameras")
+    return tuple(CameraFormat.model_validate(entry) for entry in data["cameras"])
 
 
 def is_camera_name(text: str) -> bool:
