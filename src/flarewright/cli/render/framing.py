@@ -10,7 +10,7 @@ from ..common import picture_size
 
 if TYPE_CHECKING:
     from ...io.project.camera_list import CameraFormat
-    from ...model import Camera, Project
+    from ...model import Project
     from .options.record import RenderOptions
 
 __all__ = ["framed", "on_sensor"]
@@ -42,6 +42,7 @@ def framed(project: Project, flags: RenderOptions) -> tuple[Project, tuple[int, 
     """
     from ...io.measurement.ghost_model_file import is_ghost_model_file
     from ...io.project.camera_list import camera_format, is_camera_name
+    from .project_flags import project_of
 
     named = flags.sensor is not None and is_camera_name(flags.sensor)
     given = {"--crop": flags.crop, "--overscan": flags.overscan, "--sensor NAME": flags.sensor if named else None}
@@ -50,24 +51,62 @@ def framed(project: Project, flags: RenderOptions) -> tuple[Project, tuple[int, 
         return project, project.camera.size_px, []
     if is_ghost_model_file(project.lens):
         raise ProjectError(f"{project.lens} is a measured flare and shows the field of its captures; omit {used[0]}")
-    camera = project.camera
-    remarks: list[str] = []
     squeeze = _squeeze(project)
+    size = project.camera.size_px
+    # the default sensor is 36 mm wide after desqueezing
+    sensor = project.camera.replace(squeeze=squeeze).sensor if project.camera.desqueeze else project.camera.sensor
+    remarks: list[str] = []
     if named:
-        assert flags.sensor is not None
         fixed = flags.size is not None or flags.project is not None or flags.resumed is not None
-        camera, remarks = on_sensor(camera, camera_format(flags.sensor), squeeze, fixed)
-    if flags.crop is not None:
-        size = _cropped(camera.size_px, flags.crop)
-        camera = _resized(camera, size, squeeze)
-    counted = camera.size_px
-    if flags.overscan is not None:
-        camera = _resized(camera, _overscanned(counted, flags.overscan), squeeze)
+        size, sensor, words = on_sensor(camera_format(flags.sensor or ""), size if fixed else None, squeeze)
+        remarks.append(words)
+    counted = size if flags.crop is None else _cropped(size, flags.crop)
+    sensor = _scaled(sensor, size, counted)
+    size = counted if flags.overscan is None else _overscanned(counted, flags.overscan)
+    sensor = _scaled(sensor, counted, size)
+    if size != counted:
         remarks.append(
-            f"overscan: the picture is {camera.size_px[0]}x{camera.size_px[1]} pixels, the frame of "
-            f"{counted[0]}x{counted[1]} in its middle"
+            f"overscan: the picture is {size[0]}x{size[1]} pixels, the frame of {counted[0]}x{counted[1]} in its middle"
         )
-    return project.replace(camera=camera), counted, remarks
+    camera = {**dict(project.camera), "size_px": size, "sensor_mm": sensor}
+    return project_of({**dict(project), "camera": camera}), counted, remarks
+
+
+def on_sensor(
+    known: CameraFormat, size_px: tuple[int, int] | None, squeeze: float = 1.0
+) -> tuple[tuple[int, int], tuple[float, float], str]:
+    """Return the largest part of a sensor that has the proportions of a picture.
+
+    Parameters
+    ----------
+    known : CameraFormat
+    size_px : tuple of int or None
+        Size of the picture; None: the pixels of the sensor.
+    squeeze : float
+        Between picture and sensor, 1 for a picture that is not desqueezed.
+
+    Returns
+    -------
+    size_px : tuple of int
+    sensor_mm : tuple of float
+        Width and height of the part.
+    remark : str
+    """
+    across, down = known.sensor_mm
+    if size_px is None:
+        width, height = known.size_px or (_FILM_WIDTH_PX, max(1, round(_FILM_WIDTH_PX * down / across)))
+        size = (round(width * squeeze), height)
+    else:
+        size = size_px
+    # proportions of the picture on the sensor
+    ratio = size[0] / (size[1] * squeeze)
+    part = (across, across / ratio) if ratio >= across / down else (down * ratio, down)
+    words = f"{known.title}: {size[0]}x{size[1]} pixels on {part[0]:.2f}x{part[1]:.2f} mm"
+    if min(part[0] / across, part[1] / down) < 0.995:
+        words += f", a part of its {across:.2f}x{down:.2f} mm with the proportions of the picture"
+    elif size_px is None:
+        words += "; --size draws a smaller picture"
+    return size, part, words
 
 
 def _squeeze(project: Project) -> float:
@@ -81,44 +120,9 @@ def _squeeze(project: Project) -> float:
     return open_lens(project.lens).lens.squeeze or 1.0
 
 
-def on_sensor(camera: Camera, known: CameraFormat, squeeze: float, fixed_size: bool) -> tuple[Camera, list[str]]:
-    """Return a camera on the largest part of a sensor that has the proportions of the picture, and remarks.
-
-    Parameters
-    ----------
-    camera : Camera
-    known : CameraFormat
-    squeeze : float
-        Between picture and sensor, 1 for a picture that is not desqueezed.
-    fixed_size : bool
-        Whether the picture keeps its size; else it has the pixels of the sensor.
-    """
-    across, down = known.sensor_mm
-    size = camera.size_px
-    if not fixed_size:
-        size = known.size_px or (_FILM_WIDTH_PX, max(1, round(_FILM_WIDTH_PX * down / across)))
-        size = (round(size[0] * squeeze), size[1])
-    # proportions of the picture on the sensor
-    ratio = size[0] / (size[1] * squeeze)
-    part = (across, across / ratio) if ratio >= across / down else (down * ratio, down)
-    words = f"{known.title}: {size[0]}x{size[1]} pixels on {part[0]:.2f}x{part[1]:.2f} mm"
-    if min(part[0] / across, part[1] / down) < 0.995:
-        words += f", a part of its {across:.2f}x{down:.2f} mm with the proportions of the picture"
-    elif not fixed_size:
-        words += "; --size draws a smaller picture"
-    return camera.replace(size_px=size, sensor_mm=part), [words]
-
-
-def _resized(camera: Camera, size_px: tuple[int, int], squeeze: float) -> Camera:
-    """Return a camera with another size of the same pixels around the axis."""
-    width, height = camera.size_px
-    across, down = camera.sensor
-    if camera.sensor_mm is None and camera.desqueeze:
-        # the default is 36 mm wide after desqueezing
-        across = 36.0 / squeeze
-    sensor = (across * size_px[0] / width, down * size_px[1] / height)
-    resized: Camera = camera.replace(size_px=size_px, sensor_mm=sensor)
-    return resized
+def _scaled(sensor: tuple[float, float], size_px: tuple[int, int], new_px: tuple[int, int]) -> tuple[float, float]:
+    """Return the sensor of a picture with another number of the same pixels around the axis."""
+    return sensor[0] * new_px[0] / size_px[0], sensor[1] * new_px[1] / size_px[1]
 
 
 def _cropped(size_px: tuple[int, int], text: str) -> tuple[int, int]:

@@ -228,10 +228,8 @@ def _picture(options: GhostsOptions) -> dict[str, Any]:
 
     if not is_camera_name(options.sensor):
         return {**size, "sensor_mm": pair(options.sensor, "--sensor", "36x24 (mm)", "x")}
-    from ...model import Camera
-
-    camera, _ = on_sensor(Camera.model_validate(size), camera_format(options.sensor), 1.0, bool(size))
-    return {"size_px": camera.size_px, "sensor_mm": camera.sensor_mm}
+    size_px, sensor_mm, _ = on_sensor(camera_format(options.sensor), size.get("size_px"))
+    return {"size_px": size_px, "sensor_mm": sensor_mm}
 
 
 def _at_pixel(project: Project, options: GhostsOptions) -> Project:
