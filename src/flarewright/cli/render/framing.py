@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["framed", "on_sensor"]
 
-# width of a picture of film, which has no pixels of its own
+# width of a picture of film, which has no pixels
 _FILM_WIDTH_PX = 1280
 _PART = re.compile(r"^\s*(\d+(?:\.\d+)?)\s*(%|px)?\s*$")
 

@@ -201,6 +201,6 @@ def with_lights(given: tuple[GivenTrack, ...], names: Sequence[str]) -> tuple[Gi
 
 
 def with_new_lights(given: tuple[GivenTrack, ...], known: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the lights with one more for each track that moves none of them; its place follows from the track."""
+    """Return the lights and a new one for each track that moves no known light; its place follows from the track."""
     new = {one.index: one.track.name for one in given if one.index >= len(known)}
     return [*known, *({"field_deg": (0.0, 0.0), "name": new[index]} for index in sorted(new))]

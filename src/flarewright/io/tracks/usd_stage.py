@@ -70,13 +70,13 @@ def read_stage(path: str | Path) -> TrackFile:
         camera = tuple(_camera(geom.Camera(cameras[0]), frame, geom, usd, name) for frame in frames)
         lights = tuple(_light(prim, frames, geom, lux, usd) for prim in prims)
         tracks, remarks = tracks_of_scene(name, camera, lights)
-        dimmed = [
+        faded = [
             str(prim.GetName()) for prim in prims if lux.LightAPI(prim).GetIntensityAttr().ValueMightBeTimeVarying()
         ]
-        if dimmed:
+        if faded:
             remarks = (
                 *remarks,
-                f"{name}: intensities of {', '.join(dimmed)[:200]} change, of which only 0 has an effect",
+                f"{name}: intensities of {', '.join(faded)[:200]} change, of which only 0 has an effect",
             )
         if placeless:
             remarks = (*remarks, f"{name}: {', '.join(placeless)[:200]} have no place, so they are left out")
