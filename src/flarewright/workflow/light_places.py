@@ -153,7 +153,7 @@ def resting_tracks(project: Project, places: Mapping[int, tuple[float, float]]) 
         return []
     start, fps = project.timeline.start, float(frame_rate(project.timeline.fps))
     frames = np.arange(start, start + ceil(length_s(project) * fps - 1e-6) + 1, dtype=np.float64)
-    return [(index, Track("", frames, np.tile(place, (len(frames), 1)))) for index, place in places.items()]
+    return [(index, Track("--light-px", frames, np.tile(place, (len(frames), 1)))) for index, place in places.items()]
 
 
 def assigned(names: Sequence[str], wanted: Sequence[str | int | None], lights: Sequence[str]) -> tuple[int, ...]:

@@ -126,7 +126,9 @@ def project_of_options(
     from .tracks import given_tracks, placed, with_given_tracks, with_lights
 
     _check_places(options, timeline)
-    tracked = given_tracks(options, 1 if timeline is None else timeline.get("start", 1))
+    base = read_project(options.project) if options.project is not None else None if state is None else state.project
+    start = (timeline or {}).get("start", 1 if base is None else base.timeline.start)
+    tracked = given_tracks(options, start)
     flags = replace(options, resumed=None if state is None else state.project, tracked=tracked)
     given, plain = settings_of(flags), options.ideal or options.project is not None or state is not None
     remarks: list[str] = []
@@ -134,8 +136,9 @@ def project_of_options(
         flags, of_look, unfit = put_look(flags, options.look)
         given, remarks = given | of_look, list(unfit)
     if flags.tracked:
-        base = read_project(flags.project) if flags.project is not None else flags.resumed
-        known = known_lights(flags, base.lights if base is not None else ())
+        # a look has put the lights of the project, or its own, into `resumed`
+        lit = base if flags.resumed is None else flags.resumed
+        known = known_lights(flags, () if lit is None else lit.lights)
         flags = replace(flags, tracked=with_lights(flags.tracked, [light.get("name", "light") for light in known]))
     settings = build_project(flags)
     if not plain:

@@ -147,7 +147,21 @@ def with_given_tracks(
             project, tuple((one.index, one.track) for one in given), counted_px=counted_px,
             keep=frozenset(name for name, kept in keep.items() if kept), progress=progress,
         )  # fmt: skip
-    return project, [*(line for file in files for line in file.remarks), *remarks, *found]
+    lines = [line for file in files for line in file.remarks]
+    return project, [*lines, *_without_effect(flags, files), *remarks, *found]
+
+
+def _without_effect(flags: RenderOptions, files: Sequence[TrackFile]) -> list[str]:
+    """Return remarks on options that the formats of the tracks leave without effect."""
+    remarks = []
+    formats = sorted({file.format for file in files})
+    if flags.px_origin is not None and not flags.light_px and "csv" not in formats:
+        remarks.append(f"--px-origin has no effect on tracks of {', '.join(formats)}, which have their own corner")
+    if flags.track_size is not None and all(track.size_px == (1.0, 1.0) for file in files for track in file.tracks):
+        remarks.append(
+            f"--track-size has no effect on tracks of {', '.join(formats)}, which count in parts of the picture"
+        )
+    return remarks
 
 
 def placed(
