@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from .lens_flares import scene_flare as scene_flare
     from .lens_search import LensSearch as LensSearch
     from .lens_search import search_lenses as search_lenses
+    from .light_places import lights_at_pixels as lights_at_pixels
+    from .light_places import with_tracks as with_tracks
     from .measure_provenance import STAGES as STAGES
     from .measure_run import StageResult as StageResult
     from .measure_run import run_stages as run_stages
@@ -61,6 +63,7 @@ __all__, __getattr__, __dir__ = lazy_names(
             "LensSearch",
             "search_lenses",
         ),
+        ".light_places": ("lights_at_pixels", "with_tracks"),
         ".measure_provenance": ("STAGES",),
         ".measure_run": ("StageResult", "run_stages"),
         ".project_files": ("open_project_files",),

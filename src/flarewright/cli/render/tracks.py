@@ -111,8 +111,10 @@ def given_tracks(flags: RenderOptions, first_frame: int) -> tuple[GivenTrack, ..
 
 def _light_and_file(text: str) -> tuple[str | int | None, Path]:
     """Return the light and the file of a `--track`."""
+    from ...io.files.door import expanded
+
     light, equals, path = text.partition("=")
-    if not equals or Path(text).exists() or "/" in light or "\\" in light:
+    if not equals or expanded(text).exists() or "/" in light or "\\" in light:
         return None, Path(text)
     word = light.strip()
     if not word or not path.strip():
