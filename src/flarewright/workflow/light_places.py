@@ -354,7 +354,7 @@ def _moved(light: Light, track: Track, keys: list[LightKey], project: Project, k
         "field_deg": keys[0].field_deg, "keyframes": tuple(keys), "motion": "linear", "curves": tuple(curves.values()),
     }  # fmt: skip
     if track.diameter_deg > 0.0 and not light.extended:
-        changes["diameter_deg"] = min(max(track.diameter_deg, 1e-6), 60.0)
+        changes["diameter_deg"] = track.diameter_deg
     moved: Light = light.replace(**changes)
     return moved
 

@@ -7,6 +7,7 @@ import pytest
 
 from flarewright import Camera, Light, Lines, Output, Project, Quality, render
 from flarewright.errors import ProjectError
+from flarewright.io.lens.library import library_names
 from flarewright.model import Imperfection
 from flarewright.optics.rays.image_height import image_heights
 from flarewright.render.scene.direct_image import direct_image
@@ -103,3 +104,21 @@ def test_beyond_the_field_one_sentence_says_how_far_it_reaches():
         ProjectError, match=r"no direct image at 2600,-300 px, 1843 px .* up to 14\d\d px \(3\d\.\d deg"
     ):
         field_angles_at(images, (2600.0, -300.0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lens", library_names())
+def test_every_direct_image_of_every_lens_is_found_again(lens):
+    """Up to the edge of the field that the lens images, where steps often lead to where it passes no light."""
+    images = images_of(lens=lens)
+    random = np.random.default_rng(1)
+    found = 0
+    for _ in range(60):
+        slope, azimuth = np.tan(np.radians(random.uniform(0.0, 40.0))), random.uniform(0.0, 2.0 * np.pi)
+        field = np.degrees(np.arctan([slope * np.cos(azimuth), slope * np.sin(azimuth)]))
+        place = image_px(images, (float(field[0]), float(field[1])))
+        if place is not None:
+            again = image_px(images, field_angles_at(images, place))
+            assert np.hypot(again[0] - place[0], again[1] - place[1]) < TOLERANCE_PX
+            found += 1
+    assert found > 4

@@ -218,5 +218,11 @@ def with_lights(given: tuple[GivenTrack, ...], names: Sequence[str]) -> tuple[Gi
 
 def with_new_lights(given: tuple[GivenTrack, ...], known: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return the lights and a new one for each track that moves no known light; its place follows from the track."""
-    new = {one.index: one.track.name for one in given if one.index >= len(known)}
-    return [*known, *({"field_deg": (0.0, 0.0), "name": new[index]} for index in sorted(new))]
+    new = {one.index: one.track for one in given if one.index >= len(known)}
+    return [
+        *known,
+        *(
+            {"field_deg": (0.0, 0.0), "name": track.name, "diameter_deg": track.diameter_deg}
+            for _, track in sorted(new.items())
+        ),
+    ]

@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from ...errors import FileError
+from ...model.project.light import LEAST_LIGHT_DEG
 from ...typing import Floats
 from .track import Track
 
@@ -134,6 +135,7 @@ def tracks_of_scene(
         states = [_at(light.frames, frame) for frame in frames]
         levels = [state.intensity for state in states if state.intensity is not None]
         colours = [state.rgb for state in states if state.rgb is not None]
+        widest = max(size for (_, _, size), away in zip(known, hidden, strict=True) if not away)
         tracks.append(
             Track(
                 light.name[:80], np.array(frames, dtype=np.float64), np.array([place for place, _, _ in known]),
@@ -141,7 +143,7 @@ def tracks_of_scene(
                 intensity=np.array(levels) if len(levels) == len(states) else None,
                 rgb=np.array(colours) if len(colours) == len(states) else None,
                 hidden=hidden if hidden.any() else None,
-                diameter_deg=max(size for (_, _, size), away in zip(known, hidden, strict=True) if not away),
+                diameter_deg=min(widest, 60.0) if widest >= LEAST_LIGHT_DEG else 0.0,
             )
         )  # fmt: skip
     if not tracks:

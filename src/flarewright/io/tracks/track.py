@@ -38,7 +38,7 @@ class Track:
     hidden : ndarray, shape (N,), or None
         Frames in which the light is off or behind the camera.
     diameter_deg : float
-        Angular diameter of the light, 0 for a point or if unknown.
+        Largest angular diameter of the light, at most 60; 0 for a point or if unknown.
     """
 
     name: str
