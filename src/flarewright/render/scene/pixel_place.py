@@ -25,6 +25,8 @@ TOLERANCE_PX = 0.02
 MOST_STEPS = 40
 # largest angle from the axis of a step, and of any light, radians
 LARGEST_STEP, LARGEST_ANGLE = 0.35, radians(89.9)
+# step at which the search ends, radians, and determinant of the map, in paraxial ones, below which it is folded
+LEAST_STEP, FOLDED = 1e-9, 1e-6
 # halvings between an angle at which the lens passes light and one at which it does not, for the error message
 HALVINGS = 12
 
@@ -128,48 +130,55 @@ def field_angles_at(
     fisheye is nearly linear. A step that leads to where the lens passes no light is halved. Tests:
     tests/render/scene/test_pixel_place.py compares with the centroid of drawn pictures.
     """
-    target = np.array(place_px)
     column, row, across, down = images.shot.to_pixels
     pixels = np.array([across, -down]) * images.squeezed
-    start = (target - [column, row]) / pixels
-    at = _angle_of(np.tan(np.radians(near_deg))) if near_deg is not None else _angle_of(start)
-    found = _traced(images, at)
+    starts = [(np.array(place_px) - [column, row]) / pixels]
+    if near_deg is not None:
+        starts.insert(0, np.tan(np.radians(near_deg)))
+    for start in starts:
+        found = _search(images, np.array(place_px), _angle_of(start), pixels)
+        if found is not None:
+            x, y = np.degrees(np.arctan(_slope_of(found)))
+            return float(x), float(y)
+    raise ProjectError(_beyond(images, place_px))
+
+
+def _search(images: DirectImages, target: Floats, start: Floats, pixels: Floats) -> Floats | None:
+    """Return the angle vector whose direct image lies at a target, from a start; None if none is found.
+
+    `pixels` are those per radian near the axis, across and down.
+    """
+    at, found = start, _traced(images, start)
     while found is None and np.hypot(*at) > 1e-3:
         # beyond the lens' field: start further inside
         at = 0.7 * at
         found = _traced(images, at)
     if found is None:
         raise ProjectError(f"{images.lens.name} passes no light near its axis, so no pixel can be the place of a light")
-    # pixels per radian near the axis
-    slope, steps, held = np.diag(pixels), 0, 1.0
-    best, miss = at, target - found
-    while np.hypot(*miss) > TOLERANCE_PX:
+    slope, held = np.diag(pixels), 1.0
+    miss = target - found
+    for _ in range(MOST_STEPS):
+        if np.hypot(*miss) <= TOLERANCE_PX:
+            return at
         step = held * np.linalg.solve(slope, miss)
         length = float(np.hypot(*step))
-        step *= min(1.0, LARGEST_STEP / max(length, 1e-300))
-        ahead = at + step
-        there = _traced(images, ahead) if np.hypot(*ahead) < LARGEST_ANGLE else None
-        steps += 1
-        if steps > MOST_STEPS or length < 1e-9:
-            break
+        if length < LEAST_STEP:
+            return None
+        step *= min(1.0, LARGEST_STEP / length)
+        there = _traced(images, at + step) if np.hypot(*(at + step)) < LARGEST_ANGLE else None
         if there is None:
             held *= 0.5
             continue
-        change = (there - found) - slope @ step
-        slope = slope + np.outer(change, step) / (step @ step)
-        at, found, held = ahead, there, 1.0
-        if abs(np.linalg.det(slope)) < 1e-6 * abs(np.prod(pixels)):
-            # an update that made the map fold: begin again from the paraxial one
+        slope = slope + np.outer(there - (target - miss) - slope @ step, step) / (step @ step)
+        if abs(np.linalg.det(slope)) < FOLDED * abs(np.prod(pixels)):
+            # an update that folds the map: begin again from the paraxial one
             slope = np.diag(pixels)
-        if np.hypot(*(target - found)) < np.hypot(*miss) or steps < 2:
-            best, miss = at, target - found
+        if np.hypot(*(target - there)) < np.hypot(*miss):
+            at, miss, held = at + step, target - there, 1.0
         else:
-            # farther away than before: back, with a shorter step
-            at, found, held = best, target - miss, 0.5
-    if np.hypot(*miss) > TOLERANCE_PX:
-        raise ProjectError(_beyond(images, place_px))
-    x, y = np.degrees(np.arctan(_slope_of(best)))
-    return float(x), float(y)
+            # farther away than before: a shorter step from the same place
+            held = 0.5
+    return None
 
 
 def _traced(images: DirectImages, angle: Floats) -> Floats | None:
