@@ -444,7 +444,7 @@ COMMAND_LINES = {
     "output without a name": ([*H, "--light", "1,1", "-o", ""], "the name of the output is empty"),
     "output is the folder above": ([*H, "--light", "1,1", "-o", ".."], "cannot write ..: it is a folder"),
     "output is an ending": ([*H, "--light", "1,1", "-o", ".exr"], "an ending without a name; write flare.exr"),
-    "ghosts without a light": (["ghosts", "heliar-tronnier"], "no light is given; give its place in degrees by --light X,Y"),
+    "ghosts without a light": (["ghosts", "heliar-tronnier"], "no light is given; give its place in degrees"),
     "ghosts in X-rays": (["ghosts", "heliar-tronnier", "--light", "1,1", "--wavelength-nm", "1"], "not visible"),
     "ghosts too fast": (["ghosts", "heliar-tronnier", "--light", "1,1", "--fstop", "1"], "f/1 is faster"),
     "ghosts of unknown paths": (["ghosts", "heliar-tronnier", "--light", "1,1", "--paths", "x"], "--paths should be"),

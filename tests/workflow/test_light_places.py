@@ -111,6 +111,10 @@ def test_the_timeline_begins_with_the_tracks_of_a_project_that_rests():
     assert (found.timeline.start, found.timeline.fps, len(remarks)) == (1001, 25.0, 2)
     kept, remarks = timeline_of_tracks(project(), [file], fps_given=True, start_given=True)
     assert (kept.timeline, len(remarks)) == (Timeline(start=1001), 1)
+    later = TrackFile((Track("a", FRAMES + 5.0, PATH),), "csv", fps=30.0)
+    assert timeline_of_tracks(project(), [later])[0].timeline == Timeline(start=1001, fps=30.0)
+    several, remarks = timeline_of_tracks(project(), [file, later])
+    assert (several.timeline, "have 25, 30 frames per second" in remarks[0]) == (Timeline(start=1001), True)
     with pytest.raises(ProjectError, match="begins at frame 1001, before frame 1100 at 0 s; give --start 1001"):
         with_tracks(project().replace(timeline=Timeline(start=1100)), [(0, file.tracks[0])])
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ProjectError
-from ..model import Light, LightCurve, LightKey, Project
+from ..model import Light, LightCurve, LightKey, Project, Timeline
 from ..model.project.animation import FIRST_FRAME, LAST_FRAME, LAST_S
 from ..typing import Floats
 from .keyframes import frame_rate, is_still, length_s, light_at, project_at, still, time_of
@@ -224,7 +224,7 @@ def timeline_of_tracks(
     project : Project
     files : sequence of TrackFile
     fps_given, start_given : bool
-        Whether the caller has set them; they then stay, as do those of a project that moves.
+        Whether the caller has set them; they then stay, as do those of a project that moves or states a start.
 
     Returns
     -------
@@ -242,6 +242,9 @@ def timeline_of_tracks(
     wrong = next((fps for fps in stated if not 0.01 <= fps <= 1000.0), None)
     if wrong is not None:
         raise ProjectError(f"the track states {wrong:g} frames per second; correct it, 0.01 to 1000 are possible")
+    if len(stated) > 1:
+        listed = ", ".join(f"{fps:g}" for fps in sorted(stated))
+        remarks.append(f"the tracks have {listed} frames per second and the shot {timeline.fps:g}: frames keep numbers")
     if len(stated) == 1 and (fps := stated.pop()) != timeline.fps:
         if resting and not fps_given:
             timeline = timeline.replace(fps=fps)
@@ -251,7 +254,8 @@ def timeline_of_tracks(
                 f"the track has {fps:g} frames per second and the shot {timeline.fps:g}: frames keep numbers"
             )
     first = int(np.floor(min(float(track.frames[0]) for file in files for track in file.tracks)))
-    if first != timeline.start and resting and not start_given:
+    # a project that states its start keeps it
+    if first != timeline.start and resting and not start_given and timeline.start == Timeline().start:
         if not FIRST_FRAME <= first <= LAST_FRAME:
             raise ProjectError(f"a track begins at frame {first}; frames are {FIRST_FRAME} to {LAST_FRAME}")
         timeline = timeline.replace(start=first)
