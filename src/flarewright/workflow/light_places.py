@@ -383,7 +383,8 @@ def _remarks_on(track: Track, size_px: tuple[int, int], index: int) -> list[str]
     """Return remarks on what a track does: its light, its scale, its missing frames."""
     label = f"track {track.name!r}"
     first, last = track.frames[0], track.frames[-1]
-    found = [f"{label} moves light {index} (counted from 0) in frames {first:g} to {last:g}"]
+    when = f"in frames {first:g} to {last:g}" if last > first else f"at frame {first:g}"
+    found = [f"{label} moves light {index} (counted from 0) {when}"]
     own = track.size_px
     if own is not None and own != (1.0, 1.0) and own != tuple(size_px):
         words = f"{label}: places in {own[0]:g}x{own[1]:g} pixels are scaled to {size_px[0]}x{size_px[1]}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -108,6 +109,12 @@ def test_a_scene_of_blender_gives_the_pinhole_projection(read):
     assert sun.directions[0] == pytest.approx((0.0, 0.75))
     assert sun.diameter_deg == 0.53
     assert ["'behind' is never in front" in line for line in found.remarks] == [True]
+
+
+def test_the_example_of_the_documentation_can_be_read(read):
+    text = (Path(__file__).parents[3] / "docs" / "placing-lights.md").read_text("utf-8")
+    (sun,) = read(text.partition("```json")[2].partition("```")[0]).tracks
+    assert sun.directions[0] == pytest.approx((0.0, 0.17 / 0.98))
 
 
 def test_curves_of_nuke_have_gaps_slopes_and_binary_numbers(read):

@@ -66,7 +66,7 @@ def sun_remark(flags: RenderOptions) -> list[str]:
     return [
         f"the sun stands at azimuth {found.azimuth_deg:.2f}, elevation {found.elevation_deg:.2f} degrees, field angles "
         f"{found.field_deg[0]:.2f},{found.field_deg[1]:.2f}; in a clear sky it gives {found.illuminance_lx / 1e3:.0f} "
-        "klx, which --intensity can follow"
+        "klx; its intensity is that of --intensity (default: 1)"
     ]
 
 
