@@ -11,8 +11,8 @@ from .kill_and_resume import TRIALS, kill_and_resume
 
 # commands that end within a minute on any machine and any sensible input
 SHORT = {
-    "nuke-script", "ghosts", "cameras", "lenses", "edit", "lens show", "lens check", "lens convert", "lens schema", "looks save",
-    "library list", "library search", "library show", "library remove",
+    "nuke-script", "ghosts", "cameras", "lenses", "edit", "lens show", "lens check", "lens convert", "lens schema",
+    "looks save", "library list", "library search", "library show", "library remove",
     "coating list", "coating plot", "project init", "project check", "project schema", "scene init", "scene check",
     "scene schema", "design target", "design resize", "design move-stop", "design identify", "measure report",
     "measure replay",
