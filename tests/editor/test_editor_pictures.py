@@ -200,6 +200,7 @@ def test_drafts_are_as_bright_as_final_pictures(shot):
     assert draft_match.matched(render_picture.take(moved, "draft", look), final, match) is match
 
 
+@pytest.mark.slow
 def test_drafts_are_as_bright_at_every_place_of_a_drag(shot, monkeypatch):
     """After jumps of 20 degrees they used to be up to a stop off until the drag paused."""
     look, far = View(), 0.0
@@ -252,7 +253,7 @@ def test_drafts_are_as_bright_at_every_place_of_a_drag(shot, monkeypatch):
 @pytest.mark.usefixtures("screen_size")
 def test_a_screen_learns_of_other_places_while_it_rests(monkeypatch):
     if render_picture.WIDEST < 960:
-        monkeypatch.setattr(calibration_module, "ANGLES_DEG", (0.0, 20.0, 40.0))
+        monkeypatch.setattr(calibration_module, "ANGLES_DEG", (20.0, 40.0))
     session, _ = begin(None)
     screen = Screen(session, sharpen)
     screen.start()
@@ -260,7 +261,7 @@ def test_a_screen_learns_of_other_places_while_it_rests(monkeypatch):
     calibration = screen.match.calibration
     assert missing(calibration, session.project) == []
     # the calibration holds while the lens does
-    session.do("move_light", {"light": 0, "x": -12.0, "y": 5.0})
+    session.do("move_light", {"light": 0, "x": 3.0, "y": 1.0})
     assert screen.wait(60.0)
     assert screen.match.calibration is calibration
     assert screen.match.lights == session.project.lights
@@ -527,19 +528,19 @@ def test_a_slow_picture_is_traced_for_the_screen_first():
     screen.show = reported
     screen.start()
     assert screen.wait(60.0)
-    for seconds, wanted in ((5.0, ["draft", "soon", "final"]), (0.01, ["final"])):
+    # places of other tests as well, whose pictures are drawn once
+    for x, seconds, wanted in ((3.0, 5.0, ["draft", "soon", "final"]), (4.5, 0.01, ["final"])):
         grades.clear()
         screen.final_s = seconds
-        light = session.project.lights[0].field_deg
-        session.do("move_light", {"light": 0, "x": light[0] + 1.0, "y": light[1]})
+        session.do("move_light", {"light": 0, "x": x, "y": 1.0})
         assert screen.wait(60.0)
         assert grades == wanted
     # the last picture of a drag serves as a draft
     hand = Drag(screen)
-    for seconds, wanted in ((5.0, ["soon", "final"]), (0.38, ["final"])):
+    for x, seconds, wanted in ((5.0, 5.0, ["soon", "final"]), (3.0, 0.38, ["final"])):
         grades.clear()
         screen.final_s = seconds
-        place = {"light": 0, "x": 4.0 + seconds, "y": 1.0}
+        place = {"light": 0, "x": x, "y": 1.0}
         assert hand.picture(partial(move_light, **place), session.revision)
         session.do("move_light", place)
         assert screen.wait(60.0)
@@ -552,6 +553,7 @@ def test_a_slow_picture_is_traced_for_the_screen_first():
         assert grades == ["draft", "soon", "final"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("screen_size")
 def test_what_would_be_late_is_traced_for_the_screen_in_haste(monkeypatch):
     session, _ = begin(None)
@@ -582,6 +584,7 @@ def test_what_would_be_late_is_traced_for_the_screen_in_haste(monkeypatch):
     assert quick.tolerance_px == render_picture.SOON_TOLERANCE_PX
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("screen_size")
 def test_the_target_follows_a_drag_and_is_that_of_its_place(monkeypatch, request):
     def pixels(data):
@@ -663,7 +666,7 @@ def test_a_drag_is_followed_to_its_end():
     session.do("set_coating", {"text": "none"})
     assert screen.wait(60.0)
     assert screen.exposure_stops == exposure
-    session.do("choose_lens", {"lens": "speed-panchro-50"})
+    session.do("choose_lens", {"lens": "tessar-brendel"})
     assert screen.wait(60.0)
     assert screen.exposure_stops != exposure
     session.undo()
@@ -869,15 +872,16 @@ def test_rounding_draws_no_border_beside_a_ghost():
     assert np.argwhere(_lit(pixels)).max() == 4
 
 
-def test_a_black_picture_sets_no_exposure(shot):
+@pytest.mark.usefixtures("screen_size")
+def test_a_black_picture_sets_no_exposure():
     """An exposure of 0 used to be found, which left everything black when the light returned."""
     session, _ = begin(None)
     screen = Screen(session, sharpen)
-    session.put(shot.replace(f_number=16.0, lights=(Light(field_deg=(-80.0, 0.0)),)), "Begin in the dark")
+    session.put(session.project.replace(lights=(Light(field_deg=(-80.0, 0.0)),)), "Begin in the dark")
     assert screen.wait(60.0)
     # no exposure was stored
     assert session.view.found_stops is None
-    session.do("move_light", {"light": 0, "x": 6.0, "y": 3.0})
+    session.do("move_light", {"light": 0, "x": 3.0, "y": 1.0})
     assert screen.wait(60.0)
     found = screen.exposure_stops
     assert found == session.view.found_stops == render_picture.exposure_of(screen.picture)
@@ -889,7 +893,7 @@ def test_a_black_picture_sets_no_exposure(shot):
     # another lens chosen in the dark is exposed when a ghost is visible
     session.do("choose_lens", {"lens": "tessar-brendel"})
     assert screen.wait(60.0)
-    session.do("move_light", {"light": 0, "x": 6.0, "y": 3.0})
+    session.do("move_light", {"light": 0, "x": 3.0, "y": 1.0})
     assert screen.wait(60.0)
     assert screen.exposure_stops == render_picture.exposure_of(screen.picture) != found
     session.writer.close()
@@ -902,7 +906,7 @@ def test_undo_leads_back_to_the_exposure_of_the_lens_before():
     screen = Screen(session, sharpen)
     screen.start()
     assert screen.wait(60.0)
-    session.do("move_light", {"light": 0, "x": 1.0, "y": 0.5})
+    session.do("move_light", {"light": 0, "x": 3.0, "y": 1.0})
     assert screen.wait(60.0)
     held = screen.exposure_stops
     assert held != render_picture.exposure_of(screen.picture)
@@ -1002,8 +1006,7 @@ def test_a_page_fetches_what_is_final_for_the_screen_before_the_next_picture_is_
     # a page that fetches every picture
     session.listeners.append(lambda event: screen.fetched.set() if event["type"] == "picture" else None)
     screen.final_s = 1.0
-    light = session.project.lights[0].field_deg
-    session.do("move_light", {"light": 0, "x": light[0] + 1.0, "y": light[1]})
+    session.do("move_light", {"light": 0, "x": 3.0, "y": 1.0})
     assert screen.wait(50.0)
     assert ("final", True) in started
     # if no page fetches it, the full picture follows all the same
@@ -1011,7 +1014,7 @@ def test_a_page_fetches_what_is_final_for_the_screen_before_the_next_picture_is_
     session.listeners.pop()
     started.clear()
     screen.final_s = 1.0
-    session.do("move_light", {"light": 0, "x": light[0] + 2.0, "y": light[1]})
+    session.do("move_light", {"light": 0, "x": 4.5, "y": 1.0})
     assert screen.wait(50.0)
     assert screen.picture.grade == "final"
     assert ("final", False) in started

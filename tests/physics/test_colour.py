@@ -7,6 +7,8 @@ colours of few wavelengths, and no mean over a band.
 
 from __future__ import annotations
 
+from functools import cache
+
 import colour
 import numpy as np
 import pytest
@@ -71,6 +73,7 @@ def at_lines(spectrum):
     return Lines(lines=tuple(zip(LINES_NM.tolist(), power.tolist(), strict=True)))
 
 
+@cache
 def pictures(case, spectrum, wavelengths, mode="final", size=(96, 54), layers="ghosts", **quality):
     lens, coating, field, f_number = {**CASES, **MORE, **ZOOM}[case]
     project = Project(
@@ -87,8 +90,9 @@ def pictures(case, spectrum, wavelengths, mode="final", size=(96, 54), layers="g
 
 def off_by(case, spectrum, wavelengths, mode="final"):
     """Return the error of each compared ghost, relative to its largest channel."""
-    exact = pictures(case, at_lines(spectrum), len(LINES_NM), mode)
-    found = pictures(case, spectrum, wavelengths, mode)
+    shown = () if mode == "final" else (mode,)
+    exact = pictures(case, at_lines(spectrum), len(LINES_NM), *shown)
+    found = pictures(case, spectrum, wavelengths, *shown)
     sums = {name: pixels.sum(axis=(0, 1)) for name, pixels in exact.items() if name.startswith("ghost.")}
     brightest = max(np.abs(rgb).max() for rgb in sums.values())
     counted = {name: rgb for name, rgb in sums.items() if np.abs(rgb).max() > FAINTEST * brightest}
@@ -165,10 +169,15 @@ STEEP = {
         "draft",
     ),
 }
+# lenses of few surfaces: the paths of a zoom of forty take a second each
+STEEP_FAST = (
+    "sliver", "red end", "draft", "draft of bare glass", "draft that bends at one end", "abrupt end of a draft",
+)  # fmt: skip
 # nine lines, none of which is among seven traced wavelengths
 FEW_LINES = Lines(lines=tuple((nm, 1.0) for nm in (367.0, 383.0, 402.0, 436.0, 480.0, 546.0, 578.0, 640.0, 700.0)))
 
 
+@cache
 def ghost_of(case, spectrum, wavelengths, **quality):
     """Draw one ghost and return its sum."""
     lens, coating, field, f_number, name, mode = {**STEEP, **HIDDEN, **LAMPS}[case]
@@ -210,13 +219,14 @@ WINDOWS_NM = {"hidden draft": (360.0, 410.0), "short draft": (360.0, 410.0)}
 
 
 @pytest.mark.parametrize(
-    "case", [pytest.param(case, marks=pytest.mark.slow if case == "totally reflected draft" else ()) for case in STEEP]
+    "case", [pytest.param(case, marks=() if case in STEEP_FAST else pytest.mark.slow) for case in STEEP]
 )
 def test_a_ghost_that_passes_at_one_end_of_the_spectrum_has_its_colour(case):
     assert steep_error(case, D65(), at_lines(D65())) < GHOST
 
 
-@pytest.mark.parametrize("case", ["hidden draft", pytest.param("short draft", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["hidden draft", "short draft"])
 def test_a_draft_has_its_light_up_to_where_it_ends(case):
     """Lines that all lie where the ghost has light resolve the end; over the whole range, 60 and 61 differ by 14 %."""
     low, high = WINDOWS_NM[case]
@@ -235,12 +245,12 @@ LAMP = BlackBody(temperature_k=2856.0)
 @pytest.mark.parametrize(
     ("case", "spectrum"),
     [
-        ("sliver", BlackBody(temperature_k=3200.0)),
-        ("sliver", BlackBody(temperature_k=9000.0)),
+        pytest.param("sliver", BlackBody(temperature_k=3200.0), marks=pytest.mark.slow),
+        pytest.param("sliver", BlackBody(temperature_k=9000.0), marks=pytest.mark.slow),
         ("draft", BlackBody(temperature_k=3200.0)),
         ("draft", BlackBody(temperature_k=9000.0)),
         ("draft that bends at one end", LAMP),
-        ("draft hidden up to the red end", LAMP),
+        pytest.param("draft hidden up to the red end", LAMP, marks=pytest.mark.slow),
     ],
 )
 def test_whatever_lights_it(case, spectrum):
@@ -278,7 +288,7 @@ LAMPS = {
     ("case", "spectrum"),
     [
         ("dark under red", RED),
-        ("gentle end", D65()),
+        pytest.param("gentle end", D65(), marks=pytest.mark.slow),
         ("steep films", MERCURY),
         ("cut by the picture", MERCURY),
     ],
@@ -319,9 +329,8 @@ def lightness(pixels):
 @pytest.mark.parametrize("case", ["triplet", pytest.param("heliar", marks=pytest.mark.slow), *SLOW])
 def test_the_whole_picture_looks_alike(case):
     """CIEDE2000 of every pixel, exposed so that its brightest parts are nearly white."""
-    size = (240, 135)
-    exact = pictures(case, at_lines(D65()), len(LINES_NM), size=size, layers="beauty")["beauty"]
-    found = pictures(case, D65(), 7, size=size, layers="beauty")["beauty"]
+    exact = pictures(case, at_lines(D65()), len(LINES_NM))["beauty"]
+    found = pictures(case, D65(), 7)["beauty"]
     gain = 0.9 / np.quantile(exact.max(axis=2), 0.995)
     far = colour.delta_E(lightness(exact * gain), lightness(found * gain), method="CIE 2000")
     assert np.median(far) < MEDIAN
@@ -330,10 +339,9 @@ def test_the_whole_picture_looks_alike(case):
 
 def z_of(case, seeds, samples):
     """Compare the reference's ghosts with the lines, each channel in standard errors."""
-    size = (48, 27)
-    exact = pictures(case, at_lines(D65()), len(LINES_NM), size=size, layers="passes")["ghosts"].sum(axis=(0, 1))
+    exact = pictures(case, at_lines(D65()), len(LINES_NM))["ghosts"].sum(axis=(0, 1))
     runs = [
-        pictures(case, D65(), 7, "reference", size, "passes", seed=seed, reference_samples=samples)["ghosts"]
+        pictures(case, D65(), 7, "reference", layers="passes", seed=seed, reference_samples=samples)["ghosts"]
         for seed in range(seeds)
     ]
     sums = np.array([run.sum(axis=(0, 1)) for run in runs])

@@ -42,7 +42,7 @@ from flarewright.render.starburst.many_lights import Stars, draw_stars
 from flarewright.render.starburst.pattern import starburst_layer
 from flarewright.render.starburst.spectrum_basis import basis_spectra
 
-SIZE = (240, 160)
+SIZE = (96, 64)
 
 
 def many(count, seed=3):
@@ -154,10 +154,12 @@ def test_stars_laid_together_are_stars_drawn_one_by_one(iris):
 @pytest.mark.parametrize(
     ("iris", "mask", "soil"),
     [
-        (Iris(blades=6, rounding=0.5, rotation_deg=7.0), None, None),
-        (Iris(blades=6, roughness_um=20.0), None, None),
+        pytest.param(Iris(blades=6, rounding=0.5, rotation_deg=7.0), None, None, marks=pytest.mark.slow),
+        pytest.param(Iris(blades=6, roughness_um=20.0), None, None, marks=pytest.mark.slow),
         (Iris(), np.kron([[0.0, 1.0], [1.0, 1.0]], np.ones((40, 40))), None),
-        (Iris(blades=7), None, Soil(Dirt(dust_per_mm2=2.0, scratches_per_cm2=20.0))),
+        pytest.param(
+            Iris(blades=7), None, Soil(Dirt(dust_per_mm2=2.0, scratches_per_cm2=20.0)), marks=pytest.mark.slow
+        ),
     ],
     ids=["rounded", "rough", "mask", "dirt"],
 )
