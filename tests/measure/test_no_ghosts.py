@@ -64,6 +64,7 @@ def test_pictures_without_ghosts_have_none(leaving_the_picture, tmp_path, seed):
     assert ghosts_found(captures, tmp_path / "run") == (0, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "searched", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["rims", "also crescents"]
 )

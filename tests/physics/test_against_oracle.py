@@ -141,6 +141,7 @@ def test_heliar():
     compare(HELIAR, 4.5, (8.0, 5.0), paths=some, samples=2000, grid=COARSE)
 
 
+@pytest.mark.slow
 def test_canon_some_paths():
     """Three of 351 paths: inside the front group, across the stop, behind it; `test_five_lenses` checks all of them."""
     some = [(5, 4), (17, 3), (27, 23)]
@@ -156,6 +157,7 @@ def test_a_shipped_lens(paths):
     compare_systems(from_lens(a_lens), a_lens, (6.0, 4.0), paths=paths, samples=2000, grid=COARSE)
 
 
+@pytest.mark.slow
 def test_a_ring_of_steep_rays_around_the_rest():
     """Nearly totally reflected rays pass in a ring thinner than the cells of the pre-pass: 4 % of this ghost."""
     a_lens = load_lens("canon-70-200-tele")

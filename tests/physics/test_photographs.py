@@ -194,6 +194,7 @@ def _red_over_blue(field_deg, film, wanted):
     return {path: red[path] / blue[path] for path in wanted}
 
 
+@pytest.mark.slow
 def test_colours_of_a_coated_lens_shift_with_the_angle():
     """A film is effectively thinner for an oblique ray: its minimum moves to blue and it reflects more red.
 

@@ -220,7 +220,7 @@ def half_pupil(name, f_number):
         pytest.param("tessar", 2.8, 0, marks=pytest.mark.slow),
     ],
 )
-@pytest.mark.parametrize("how", ["by its sag", "in its frame"])
+@pytest.mark.parametrize("how", [pytest.param("by its sag", marks=pytest.mark.slow), "in its frame"])
 def test_the_whole_pupil_carries_what_two_halves_carry(name, f_number, row, how):
     plain = lens({"heliar": HELIAR, "tessar": TESSAR}[name], f_number)
     half, whole = half_pupil(name, f_number), flux_of(ghost_table_of(changed(plain, row, **GENERAL[how]), (8.0, 5.0)))

@@ -124,7 +124,7 @@ def heliar(**changes):
     )
 
 
-@pytest.mark.parametrize(("iris", "error"), [({}, 0.01), ({"blades": 5}, 0.01)])
+@pytest.mark.parametrize(("iris", "error"), [pytest.param({}, 0.01, marks=pytest.mark.slow), ({"blades": 5}, 0.01)])
 def test_occurrence_is_that_of_a_direct_final_render(iris, error):
     """The table's coarse square, cut and rotated, against a final render of the upright frame at that roll.
 

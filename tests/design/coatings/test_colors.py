@@ -109,6 +109,7 @@ def project(*ghost_targets):
 
 
 # one descent each with one, two and three films, and fewer settings than usual
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("indices", "drawn", "starts"), [(4, 128, 3), pytest.param(14, 8192, 6, marks=pytest.mark.slow)]
 )

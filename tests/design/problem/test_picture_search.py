@@ -35,7 +35,13 @@ def drawn(places, radii, levels, direction, shapes):
 
 @pytest.mark.parametrize(
     ("direction", "blades"),
-    [((0.5**0.5, 0.5**0.5), 6), ((0.5**0.5, 0.5**0.5), 0), ((0.96, -0.28), 5), ((0.0, 1.0), 8), ((-1.0, 0.0), 6)],
+    [
+        ((0.5**0.5, 0.5**0.5), 6),
+        ((0.5**0.5, 0.5**0.5), 0),
+        ((0.96, -0.28), 5),
+        pytest.param((0.0, 1.0), 8, marks=pytest.mark.slow),
+        pytest.param((-1.0, 0.0), 6, marks=pytest.mark.slow),
+    ],
 )
 def test_the_cost_is_the_error_of_drawn_pictures(direction, blades):
     problem, structure, vector = planted(signed=False)

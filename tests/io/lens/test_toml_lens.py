@@ -507,7 +507,7 @@ def lenses(draw):
     )
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(lenses())
 def test_what_is_written_is_read_back(tmp_path_factory, lens):
     path = tmp_path_factory.mktemp("lens") / "lens.toml"

@@ -55,6 +55,7 @@ def test_an_uncached_kernel_compiles_afterwards(loaded):
     assert loaded[2:] == ["1 True"]
 
 
+@pytest.mark.slow
 def test_an_unsupported_numba_loads_kernels_itself(cache):
     place, pixels = cache
     before = """

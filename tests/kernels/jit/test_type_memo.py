@@ -191,6 +191,7 @@ def compiled_with():
     return dict(line.rsplit(" ", 1) for line in printed.splitlines())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", CHANGES)
 def test_an_unsupported_numba_compiles_without_the_memo(compiled_with, change):
     assert compiled_with[change] == "9.0"

@@ -60,7 +60,7 @@ def edges_of(corners):
 def test_the_common_part_of_two_polygons_is_that_of_a_plain_cut(flip):
     random = np.random.default_rng(4)
     seen = set()
-    for _ in range(120):
+    for _ in range(40):
         mine = circle(int(random.integers(3, 65))) * random.uniform(0.3, 2.0, 2)
         iris = circle(
             int(random.integers(3, 49)),

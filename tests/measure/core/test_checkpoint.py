@@ -133,7 +133,12 @@ def test_a_stage_that_fails_at_its_first_step_leaves_no_journal(tmp_path):
 
 @pytest.mark.parametrize(
     ("stage", "file"),
-    [("find", "found.json"), ("fit", "model.json"), ("track", "tracks.json"), ("compress", "compact.json")],
+    [
+        ("find", "found.json"),
+        pytest.param("fit", "model.json", marks=pytest.mark.slow),
+        ("track", "tracks.json"),
+        pytest.param("compress", "compact.json", marks=pytest.mark.slow),
+    ],
 )
 def test_an_interrupted_stage_resumes_to_the_same_bytes(stage, file, staged, tmp_path, capsys, monkeypatch):
     folder = copytree(staged.folder, tmp_path / "run")

@@ -56,6 +56,7 @@ def test_the_prior_of_first_order_aberrations_is_not_too_wide(traced):
         assert np.quantile(traced[:, k], 0.98) > 0.2, k
 
 
+@pytest.mark.slow
 def test_colours_differ_within_the_prior():
     """Blue and red against green: position, size and their change with the field are within the prior spread."""
     with few_rays():

@@ -86,6 +86,7 @@ def fitted(request, tmp_path_factory):
     return request.param, folder, run, rough, request.param.fitted(folder, run, rough)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fitted", BOTH[:1], indirect=True)
 def test_skipped_frames_are_not_read(fitted):
     """The files of skipped frames do not exist."""
@@ -173,6 +174,7 @@ def test_order_and_start_values_of_a_crowd_do_not_change_the_replay(tmp_path):
     assert apart(one, other) < BEGUN_ELSEWHERE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fitted", "roll_deg"),
     [

@@ -70,6 +70,7 @@ def test_found_and_fitted_from_even_angles_replays_the_odd_ones(folder, capsys):
         assert np.sqrt((error**2).mean()) < 0.03 * np.sqrt((truth**2).mean())
 
 
+@pytest.mark.slow
 def test_a_ghost_that_goes_along_with_the_light_is_found(tmp_path):
     """It covers the light's surroundings at most constellations; treated as glow it would be found in pieces."""
     planted, size = rescaled(shape(80.0, 24.0, 0.5), 0.75), (180, 120)
@@ -116,6 +117,7 @@ def test_a_fit_joins_what_was_found_in_pieces(tmp_path):
     assert any("joined the ghost of speed" in line for line in reported)
 
 
+@pytest.mark.slow
 def test_the_user_can_remove_a_ghost_and_add_one(folder, tmp_path, capsys):
     path = tmp_path / "corrections.json"
     x = AXIS[0] + SPEED * np.tan(np.radians(ANGLES[6])) / np.tan(np.radians(LARGEST))
@@ -142,6 +144,7 @@ def test_a_fit_does_not_detect_a_removed_ghost_again(tmp_path):
     assert shown.sum() == pytest.approx(render(planted[1], bare).sum(), rel=0.2)
 
 
+@pytest.mark.slow
 def test_of_many_constellations_some_are_searched_and_all_fitted(tmp_path, monkeypatch):
     angles, born, searched = np.linspace(2.0, LARGEST, 12), 5, [0, 2, 4, 7, 9, 11]
     settings = replace(PLAIN, detection=DetectionSettings(views=len(searched)))

@@ -107,6 +107,7 @@ def test_a_file_of_another_version_is_reported(folder, capsys):
     assert "schema_version" in reported(capsys, "measure", "track", folder)
 
 
+@pytest.mark.slow
 def test_what_is_of_an_earlier_model_is_neither_compressed_nor_reported(folder, capsys):
     for stage in ("track", "compress"):
         more = ["--no-residual"] if stage == "compress" else []

@@ -66,7 +66,9 @@ def learned():
     return with_residual(model, seen, 1)
 
 
-@pytest.mark.parametrize("roll", [0.0, 30.0, 90.0, 180.0, 260.0])
+@pytest.mark.parametrize(
+    "roll", [0.0, pytest.param(30.0, marks=pytest.mark.slow), 90.0, pytest.param(180.0, marks=pytest.mark.slow), 260.0]
+)
 @pytest.mark.parametrize("angle", [ANGLES[2], ANGLES[5]])
 def test_a_rolled_replay_turns_the_true_picture_and_keeps_half_of_the_residual(learned, roll, angle):
     # the ghost and the negative residual that corrects it are six times the picture: at the photographed roll neither

@@ -28,6 +28,7 @@ def folder(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_file_is_small_and_every_command_takes_it(folder, capsys, monkeypatch):
     def made(*words):
         assert command([*words, "--json"]) == 0

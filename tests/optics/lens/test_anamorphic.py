@@ -185,6 +185,7 @@ def test_a_lens_that_squeezes_nothing_says_so():
     project = Project(
         lens="heliar-tronnier", lights=(Light(field_deg=(3.0, 2.0)),),
         camera=Camera(size_px=(60, 40), desqueeze=True), quality=Quality(mode="draft", wavelengths=3),
+        output=Output(starburst=False),
     )  # fmt: skip
     reported, plain = (render(project.replace(camera=project.camera.replace(desqueeze=d))) for d in (True, False))
     assert any("desqueeze has no effect" in remark for remark in reported.remarks)

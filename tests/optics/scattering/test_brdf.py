@@ -209,7 +209,7 @@ def test_dust_covers_what_the_field_counts_with(level):
     assert area_covered(level) == pytest.approx(reported, rel=0.15)
 
 
-@pytest.mark.parametrize("wavelength_nm", [450.0, 650.0])
+@pytest.mark.parametrize("wavelength_nm", [pytest.param(450.0, marks=pytest.mark.slow), 650.0])
 def test_dust_scatters_nearly_twice_what_it_covers(wavelength_nm):
     t = np.linspace(-14.0, 0.0, 4001)
     total = 2.0 * np.pi * np.trapezoid(np.exp(2.0 * t) * dust_density(np.exp(t), wavelength_nm, 400.0), t)

@@ -235,7 +235,7 @@ def test_dirt_in_ghosts_diffracts_too():
     ("lens", "ghost", "dirt", "sensor"),
     [
         (LENS, "2-1", Dirt(dust_per_mm2=0.3, dust_um=(200.0, 400.0), seed=2, in_ghosts=True), (6.0, 4.5)),
-        ("anamorphic-heliar-2x", "8-3", Dirt(), (24.0, 12.0)),
+        pytest.param("anamorphic-heliar-2x", "8-3", Dirt(), (24.0, 12.0), marks=pytest.mark.slow),
     ],
 )
 def test_a_part_of_an_opening_rings_as_all_of_it_does(lens, ghost, dirt, sensor, monkeypatch):
@@ -314,7 +314,7 @@ def test_rings_behind_the_cylinders_come_from_tables(iris, monkeypatch):
     assert np.abs(shared - own).sum() < 0.2 * np.abs(own - sharp).sum()
 
 
-@pytest.mark.parametrize("diameter", [0.0, 0.3])
+@pytest.mark.parametrize("diameter", [pytest.param(0.0, marks=pytest.mark.slow), 0.3])
 def test_patterns_between_cylinders_are_as_fine_as_is_seen(diameter, monkeypatch):
     """Second method: patterns as fine as pixels in both meridians and for any light, one per drawn colour."""
     wanted = between_cylinders("6-3", Iris(blades=6, rounding=0.3), diameter_deg=diameter)
@@ -350,7 +350,7 @@ def test_draft_says_that_it_has_no_rings():
     ("iris", "size", "most", "of_rings"),
     [
         (Iris(blades=8, rotation_deg=10.0), 400, 4e-3, 0.08),
-        (Iris(blades=5, rounding=0.6), 400, 4e-3, 0.08),
+        pytest.param(Iris(blades=5, rounding=0.6), 400, 4e-3, 0.08, marks=pytest.mark.slow),
         pytest.param(Iris(), 400, 4e-3, 0.08, marks=pytest.mark.slow),
         # pixels as wide as fringes: the transform is only as fine as they can show
         (Iris(blades=8, rotation_deg=10.0), 100, 8e-3, 0.22),

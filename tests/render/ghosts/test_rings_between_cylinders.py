@@ -78,7 +78,7 @@ def along(lens, axis, path, order, packed, sharp, pixel):
         ("10-8", (280, 280), (24.0, 24.0), True, 0.12),
         # between them: L with one sign in both meridians, similar and not, and with both signs
         pytest.param("8-3", (240, 240), (24.0, 28.0), False, 0.25, marks=pytest.mark.slow),
-        ("6-3", (100, 300), (3.2, 12.0), False, 0.25),
+        pytest.param("6-3", (100, 300), (3.2, 12.0), False, 0.25, marks=pytest.mark.slow),
         ("10-3", (160, 200), (6.4, 8.0), False, 0.15),
     ],
 )
