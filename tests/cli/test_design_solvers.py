@@ -98,6 +98,7 @@ def test_benchmark_compares_solvers(folder, capsys, third, package, seconds):
     assert "nan" not in " ".join(re.findall(r'points="([^"]*)"', page))
 
 
+@pytest.mark.slow
 def test_coatings_and_scratch_are_compared_too(folder, capsys):
     pytest.importorskip("pygmo", reason="the extra evo is not installed: no pygmo")
     words = ["design", "benchmark", "heliar", "--coatings", "quarter-wave", "--time", "0.05", "--report", "c.html"]

@@ -70,7 +70,8 @@ def blocks(pixels):
 @pytest.mark.parametrize(
     ("lens", "f_number", "field", "model", "density", "rays"),
     [
-        ("heliar-tronnier", 5.6, (8.0, 4.0), "harvey-shack", polish, 2_000),
+        # the next test compares with random rays in little time
+        pytest.param("heliar-tronnier", 5.6, (8.0, 4.0), "harvey-shack", polish, 2_000, marks=pytest.mark.slow),
         pytest.param("heliar-tronnier", 5.6, (8.0, 4.0), "harvey-shack", polish, MANY, marks=pytest.mark.slow),
         pytest.param("double-gauss-tronnier", None, (-10.0, 5.0), "harvey-shack", polish, MANY, marks=pytest.mark.slow),
         pytest.param("heliar-tronnier", 5.6, (8.0, 4.0), "chaumond", page, MANY, marks=pytest.mark.slow),

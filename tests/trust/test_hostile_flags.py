@@ -24,10 +24,15 @@ def test_every_number_of_a_command_is_tried():
         ("render", "--rounding", "nan"),
         ("render", "--size", "1e308x1e308"),
         ("ghosts", "--wavelength", "inf"),
-        ("lens show", "--light", "nan,nan"),
-        ("measure replay", "--roll", "1e308"),
-        ("measure explain", "--light", "1e999"),
-        ("design identify", "--fstop", "-1"),
+        *(
+            pytest.param(case, marks=pytest.mark.slow)
+            for case in (
+                ("lens show", "--light", "nan,nan"),
+                ("measure replay", "--roll", "1e308"),
+                ("measure explain", "--light", "1e999"),
+                ("design identify", "--fstop", "-1"),
+            )
+        ),
         # these were noticed after merging, with its result on stdout
         ("measure run", "--every", "4294967296"),
         ("measure run", "--corrections", "x" * 5000),

@@ -26,7 +26,7 @@ def convex(rng, count: int, width: float, height: float, size: float) -> np.ndar
     return at.T + middle
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**31), count=st.integers(3, 12), size=st.floats(0.01, 14.0), turned=st.booleans())
 def test_a_polygon_covers_its_area(seed, count, size, turned):
     """Either orientation, from a hundredth of a pixel to the whole picture; edges are known to 5e-7 of a pixel."""
@@ -40,7 +40,7 @@ def test_a_polygon_covers_its_area(seed, count, size, turned):
     assert channels(canvas, 40).max() <= 3.0 * (1.0 + 1e-5)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 2**31))
 def test_a_pixel_holds_its_exact_share(seed):
     """Compare with counting points on a fine grid."""

@@ -19,7 +19,8 @@ def rendering(*fields, **light):
     return render(
         Project(
             lens="tessar-brendel", lights=tuple(Light(field_deg=field, **light) for field in fields), f_number=8.0,
-            camera=Camera(size_px=SIZE), quality=Quality(mode="draft", wavelengths=3), output=Output(layers="passes"),
+            camera=Camera(size_px=SIZE), quality=Quality(mode="draft", wavelengths=3),
+            output=Output(layers="passes", starburst=False),
         )
     )  # fmt: skip
 
