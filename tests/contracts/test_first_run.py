@@ -231,11 +231,13 @@ def test_a_command_plans_every_root_that_it_calls(size, tmp_path, request):
         (("render", *SMALL, "-o"), {"draw_matrix_ghosts", "blend_fan_wings", "draw_ringing"}),
         (("render", *SMALL, "--blades", "0", "--quality", "draft", "-o"), {"draw_bundle", "blend_blade_wings"}),
         pytest.param(
-            ("render", "canon-28-80", *SMALL[1:], "--quality", "draft", "-o"), {"draw_bundle", "blend_fan_wings"},
+            ("render", "canon-28-80", *SMALL[1:], "--quality", "draft", "-o"),
+            {"draw_bundle", "blend_fan_wings"},
             marks=pytest.mark.slow,
         ),
         pytest.param(
-            ("render", *SMALL, "--scatter", "abg", "--quality", "draft", "-o"), {"draw_bundle", "blend_fan_wings"},
+            ("render", *SMALL, "--scatter", "abg", "--quality", "draft", "-o"),
+            {"draw_bundle", "blend_fan_wings"},
             marks=pytest.mark.slow,
         ),
         (

@@ -150,10 +150,10 @@ def test_muted_ghosts_are_listed_and_can_be_outlined(project):
     assert single_ghost(muted, "8-6", "draft").max() > 0.0
 
 
-def test_picking_ignores_invisible_ghosts(shot):
+@pytest.mark.usefixtures("screen_size")
+def test_picking_ignores_invisible_ghosts():
     """With a ghost alone, a click used to choose an invisible one."""
     session, _ = begin(None)
-    session.put(shot, "Open")
     screen = Screen(session, sharpen)
     screen.start()
     assert screen.wait(60.0)

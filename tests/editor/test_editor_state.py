@@ -727,11 +727,12 @@ def test_a_lane_outlives_a_job_that_fails(capsys):
 @pytest.mark.parametrize(
     "start",
     [
+        "from flarewright.editor.common.latest_job import Lane; Lane('test').submit(work)",
         pytest.param(
-            "from flarewright.editor.common.latest_job import Lane; Lane('test').submit(work)", marks=pytest.mark.slow
+            "from flarewright.editor.design.search_job import Solver; from flarewright.editor.session.session import "
+            "begin; Solver(begin('heliar-tronnier')[0], None)._begin(work)",
+            marks=pytest.mark.slow,
         ),
-        "from flarewright.editor.design.search_job import Solver; from flarewright.editor.session.session import begin;"
-        "Solver(begin('heliar-tronnier')[0], None)._begin(work)",
     ],
     ids=["lane", "solver"],
 )

@@ -127,6 +127,7 @@ def test_an_area_light_is_the_sum_of_its_points(name, mode, effort):
     assert area[3:] == pytest.approx(points[3:], rel=0.06, abs=0.12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("wide", "size", "paths"),
     [((6.0, 2.0), (120, 80), "same-side"), pytest.param((6.0, 4.0), SIZE, "all", marks=pytest.mark.slow)],

@@ -108,7 +108,9 @@ def air_spaced(gap: float) -> Lens:
     return Lens(name="air-spaced", f_number=6.0, field_deg=1.0, rows=rows)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if k % 3 == 0 else pytest.mark.slow) for k, name in enumerate(NAMES)]
+)
 def test_a_scaled_lens_has_the_scaled_first_order_and_rims(name):
     lens = scaled(load_lens(name), 1.0)
     bare = lens.replace(

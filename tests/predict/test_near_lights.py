@@ -114,7 +114,8 @@ def test_a_tail_that_falls_by_decades_is_met_between_few_samples():
 
 def test_an_interrupted_prediction_resumes_beside_its_output(tmp_path, capsys, monkeypatch):
     page = tmp_path / "h.html"
-    arguments = ["predict", "triplet-pestrecov", "--fstop", "16", "--quality", "draft", "--samples", "7", "-o", str(page)]
+    words = "predict triplet-pestrecov --fstop 16 --quality draft --samples 7 -o"
+    arguments = [*words.split(), str(page)]
     drawn = 0
     real = table.luminance
 

@@ -283,7 +283,7 @@ def test_a_blur_is_the_convolution(sigma, mode):
     assert error.max() < max(4e-3, 0.025 / sigma**2) * expected.max()
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", [pytest.param("draft", marks=pytest.mark.slow), "final"])
 def test_ghosts_blurred_together_are_the_sum_of_each(mode):
     lights = [Light(field_deg=(8.0, 5.0)), Light(field_deg=(-3.0, 1.0), intensity=0.3)]
     rules = [Rule(select="row:4", blur_px=3.0, gain=2.0), Rule(select="row:8", blur_px=4.0, offset_px=(5, 0))]

@@ -15,12 +15,12 @@ from flarewright.render.scene.placement_remarks import veil_remarks
 SIZE = (64, 36)
 
 
-def rendering(*fields, **light):
+def rendering(*fields, starburst=False, **light):
     return render(
         Project(
             lens="tessar-brendel", lights=tuple(Light(field_deg=field, **light) for field in fields), f_number=8.0,
             camera=Camera(size_px=SIZE), quality=Quality(mode="draft", wavelengths=3),
-            output=Output(layers="passes", starburst=False),
+            output=Output(layers="passes", starburst=starburst),
         )
     )  # fmt: skip
 
@@ -79,7 +79,7 @@ def test_an_even_picture_is_a_veil():
 
 
 def test_what_a_notebook_and_an_editor_ask():
-    found = rendering((3.0, 2.0))
+    found = rendering((3.0, 2.0), starburst=True)
     shown = np.asarray(Image.open(BytesIO(found._repr_png_())))
     assert shown.shape == (36, 64, 3)
     assert shown.max() > 200
