@@ -93,7 +93,7 @@ def points_image(name):
 
 
 def late(name, mode, effort):
-    # a concave outline shows the same in final quality, and a wide disc as the sun's
+    # a concave outline shows the same in final quality, and a disc and a lamp the same as sun and window
     return effort == "whole" or (mode == "final" and name != "concave") or name in ("sun", "window")
 
 

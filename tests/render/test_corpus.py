@@ -60,10 +60,7 @@ def test_the_corpus_is_whole():
 
 
 def a_twelfth(first: int) -> list:
-    """Return all files; eleven of twelve are slow. A twelfth has some of every kind: few surfaces, wide angles, zooms.
-
-    Other fast tests read and trace all of them.
-    """
+    """Return all files; eleven of twelve are slow. `test_the_corpus_is_whole` reads all of them in every run."""
     return [
         pytest.param(path, marks=() if k % 12 == first else pytest.mark.slow, id=path.stem)
         for k, path in enumerate(FILES)
