@@ -65,9 +65,7 @@ def test_pictures_without_ghosts_have_none(leaving_the_picture, tmp_path, seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "searched", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["rims", "also crescents"]
-)
+@pytest.mark.parametrize("searched", [False, True], ids=["rims", "also crescents"])
 def test_residual_light_of_a_star_is_no_ghost(searched, tmp_path, capsys, monkeypatch):
     if not searched:
         monkeypatch.setattr(matching_pursuit, "_crescents", lambda *_: [])

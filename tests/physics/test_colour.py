@@ -169,7 +169,7 @@ STEEP = {
         "draft",
     ),
 }
-# lenses of few surfaces: the paths of a zoom of forty take a second each
+# not the paths of the longest zoom, which take a second each, nor bare glass twice
 STEEP_FAST = (
     "sliver", "red end", "draft", "draft of bare glass", "draft that bends at one end", "abrupt end of a draft",
 )  # fmt: skip

@@ -110,9 +110,7 @@ def project(*ghost_targets):
 
 # one descent each with one, two and three films, and fewer settings than usual
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("indices", "drawn", "starts"), [(4, 128, 3), pytest.param(14, 8192, 6, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("indices", "drawn", "starts"), [(4, 128, 3), (14, 8192, 6)])
 def test_several_films_meet_what_one_cannot(monkeypatch, indices, drawn, starts):
     monkeypatch.setattr(color_search, "INDICES", indices)
     monkeypatch.setattr(color_search, "DRAWN", drawn)
