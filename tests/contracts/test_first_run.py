@@ -228,7 +228,11 @@ def test_a_command_plans_every_root_that_it_calls(size, tmp_path, request):
 @pytest.mark.parametrize(
     ("words", "unused"),
     [
-        (("render", *SMALL, "-o"), {"draw_matrix_ghosts", "blend_fan_wings", "draw_ringing"}),
+        pytest.param(
+            ("render", *SMALL, "-o"),
+            {"draw_matrix_ghosts", "blend_fan_wings", "draw_ringing"},
+            marks=pytest.mark.slow,
+        ),
         (("render", *SMALL, "--blades", "0", "--quality", "draft", "-o"), {"draw_bundle", "blend_blade_wings"}),
         pytest.param(
             ("render", "canon-28-80", *SMALL[1:], "--quality", "draft", "-o"),

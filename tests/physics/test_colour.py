@@ -114,12 +114,13 @@ def test_every_ghost_has_its_colour(case):
     assert wrong == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spectrum", "wavelengths"),
     [
         (BlackBody(temperature_k=3200.0), 7),
-        pytest.param(BlackBody(temperature_k=9000.0), 7, marks=pytest.mark.slow),
-        pytest.param(D65(), 5, marks=pytest.mark.slow),
+        (BlackBody(temperature_k=9000.0), 7),
+        (D65(), 5),
     ],
 )
 def test_whatever_the_light(spectrum, wavelengths):

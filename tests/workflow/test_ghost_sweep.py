@@ -81,10 +81,10 @@ def test_axes():
 
 
 def test_the_command_prints_a_table_json_and_csv(capsys):
-    words = ["ghosts", LENS, "--light", "5,0", "--sweep", "field=0,5", "--sweep", "fstop=8,11"]
+    words = ["ghosts", LENS, "--light", "5,0", "--sweep", "field=0,5", "--sweep", "fstop=8"]
     assert run([*words, "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
-    assert len(data["points"]) == 4
+    assert len(data["points"]) == 2
     assert run([*words, "--csv"]) == 0
     rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
     flux = sum(float(row["throughput_mm2"]) for row in rows if row["path"] != "direct")

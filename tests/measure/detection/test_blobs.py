@@ -53,6 +53,7 @@ def test_a_blob_is_fitted(others, no_crescents):
     assert (best.first, best.last) == (0, len(shown) - 1)
 
 
+@pytest.mark.slow
 def test_a_blob_is_fitted_near_unexplained_light(no_crescents):
     """The surroundings are brighter: a fit that includes them drifts there, or explains too little of the light."""
     y, x = np.mgrid[: SIZE[1], : SIZE[0]]

@@ -93,9 +93,10 @@ def test_rings_that_are_not_drawn_are_invisible(f_number, light, drawn, monkeypa
     assert (np.abs(found - whole) / lit).max() < 1.5 * 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("size", "coarse", "paths"),
-    [((320, 180), (160, 90), "same-side"), pytest.param((640, 360), (640, 360), "all", marks=pytest.mark.slow)],
+    [((320, 180), (160, 90), "same-side"), ((640, 360), (640, 360), "all")],
 )
 def test_an_area_light_washes_rings_out(size, coarse, paths, drawn):
     quality = Quality(wavelengths=3, paths=paths)
