@@ -109,7 +109,6 @@ def test_a_blob_is_predicted_between_captures(run):
     assert missed(better, truth) < 0.02 * interpolated
 
 
-@pytest.mark.slow
 def test_all_that_is_learned_beside_ghosts_holds_the_small_bright_ones(run):
     """The residual is learned in four steps; the residual of coarse cells at blobs is only in the last one."""
     model, seen = run
