@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .io.images.exr import write_exr as write_exr
     from .io.images.half import exr_scale as exr_scale
     from .io.lens.coating_text import parse_coating_choice as parse_coating_choice
+    from .io.project.dataset_file import read_dataset_spec as read_dataset_spec
     from .io.project.look_file import read_look as read_look
     from .io.project.project_file import read_project as read_project
     from .measure.replay.measured_project import render_measured as render_measured
@@ -80,6 +81,8 @@ if TYPE_CHECKING:
     from .render.scene.resolve import load_lens as load_lens
     from .workflow.shot import ShotResult as ShotResult
     from .workflow.shot import shot as shot
+    from .workflow.training_pairs.run import DatasetResult as DatasetResult
+    from .workflow.training_pairs.run import dataset as dataset
 
 _HOMES = {
     ".errors": ("FlarewrightError", "GlassError", "LensError", "OutputError", "ProjectError"),
@@ -92,6 +95,7 @@ _HOMES = {
     ),
     ".io.lens.coating_text": ("parse_coating_choice",),
     ".io.images.exr": ("write_exr",),
+    ".io.project.dataset_file": ("read_dataset_spec",),
     ".io.project.look_file": ("read_look",),
     ".io.images.half": ("exr_scale",),
     ".io.project.project_file": ("read_project",),
@@ -102,6 +106,7 @@ _HOMES = {
     ".render.scene.resolve": ("load_lens",),
     ".render.render": ("Rendering",),
     ".workflow.shot": ("ShotResult", "shot"),
+    ".workflow.training_pairs.run": ("DatasetResult", "dataset"),
     # The package itself, which may be called: a function of its name could not live beside it.
     "": ("render",),
 }  # fmt: skip

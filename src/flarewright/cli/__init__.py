@@ -7,7 +7,7 @@ has its own threads, and idle library threads would spin: a fifth of a core whil
 - `common`: helpers of several commands: option values, output checks, remarks, JSON, progress bars
 - `option_record`: `with_options`, commands whose options are the fields of a record
 - `option_words`: placeholders of option values in help texts
-- `edit`, `gallery`, `looks`, `warm_up`: single commands
+- `dataset`, `edit`, `gallery`, `looks`, `warm_up`: single commands
 - `design`, `lens`, `library`, `measure`, `predict`, `project`, `render`: groups of commands
 """
 

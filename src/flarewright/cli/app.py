@@ -14,7 +14,7 @@ import typer
 from .. import __version__
 from ..errors import FlarewrightError
 from ..kernels.jit.warmup_processes import head_start
-from . import edit, gallery, looks, warm_up
+from . import dataset, edit, gallery, looks, warm_up
 from .common import end_as_interrupted
 from .design import benchmark as design_benchmark
 from .design import colors as design_colors
@@ -78,6 +78,7 @@ measure_app = typer.Typer(help="Measure a real camera's flare and replay it.")
 app.command("render", epilog=render.EPILOG)(render.render)
 app.command("shot", epilog=shot.EPILOG)(shot.shot)
 app.command("nuke-script", epilog=nuke.EPILOG)(nuke.nuke_script)
+app.command("dataset", epilog=dataset.EPILOG)(dataset.dataset)
 app.command("ghosts", epilog=ghosts.EPILOG)(ghosts.ghosts)
 app.command("predict", epilog=predict.EPILOG)(predict.predict)
 app.command("lenses", epilog=lenses.EPILOG)(lenses.lenses)
@@ -330,6 +331,8 @@ def _memory_advice(words: Sequence[str]) -> str:
             return "choose a larger --block, which makes smaller frames"
         case ["measure", _]:
             return "merge again with a larger --block, which makes smaller frames"
+        case ["dataset", *_]:
+            return "choose fewer --processes, or a smaller size_px in the specification"
         case ["shot", *_]:
             return "choose fewer --processes or a smaller --size"
         case ["render", *_]:

@@ -25,6 +25,7 @@ The command line and other front ends call these functions; nothing here prints.
 - `nuke_script`: `nuke_script`, the text of a script or gizmo that composites a flare in Nuke
 - `nuke_graph`: `flare_nodes`, `nodes_text`, its nodes and their text
 - `motion_blur`: `subframe_count` and `mean_layers`, the mean over the open shutter
+- `training_pairs`: `dataset` draws training pairs for flare removal and detection
 - `long_jobs`: `JOBS` lists the commands that can run for more than a minute, and how each keeps its partial work
 - `defaults`: default sizes of predictions
 """

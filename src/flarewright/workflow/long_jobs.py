@@ -54,6 +54,7 @@ JOBS = (
     LongJob(("predict",), "NAME.partial.npz"),
     LongJob(("render",), "NAME.partial, NAME.state.npz", "the same command, or --resume NAME.state.npz"),
     LongJob(("shot",), "the finished frames"),
+    LongJob(("dataset",), "the finished items", needs=("-o", "--output")),
     LongJob(("gallery",), "DIR/gallery.json"),
     LongJob(("library", "add"), "the library"),
     LongJob(("library", "thumbnails"), "the library"),

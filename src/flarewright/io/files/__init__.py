@@ -10,6 +10,7 @@ Readers call `text_file.read_toml` or `text_file.read_text` and turn validation 
 - `sentences`: `validation_sentences`, `did_you_mean`, `summary` and other helpers for error messages
 - `silence_libraries`: `silenced`, suppresses the output of libraries
 - `state_folder`: `state_folder`, the folder for data that outlives a run
+- `tar_members`: `tar_member`, `join_parts`, tar files joined from parts
 - `text_file`: `read_text`, `read_toml`, `read_json`, `read_bytes`, `check_version`
 - `toml_errors`: `toml_sentence`, explains TOML syntax errors
 - `type_slips`: `record_of`, makes records without type conversion

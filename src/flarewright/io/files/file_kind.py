@@ -16,7 +16,7 @@ LENS_SUFFIXES = (".toml", *FOREIGN_LENS_SUFFIXES, ".json")
 WRITTEN_LENS_SUFFIXES = (".toml", ".zmx", ".lens", ".csv", ".json")
 """Lens files that `workflow.lens_export` writes."""
 
-Kind = Literal["lens", "look", "project", "scene"]
+Kind = Literal["dataset", "lens", "look", "project", "scene"]
 
 REALFLARE_KEY, OPTILAND_KEY = "lens_elements", "surface_group"
 # the key that distinguishes them lies within this number of bytes
@@ -32,7 +32,7 @@ def refuse_other_kind(path: str | Path, table: dict[str, Any], wanted: Kind) -> 
     path : str or Path
     table : dict
         Its parsed contents.
-    wanted : {"lens", "look", "project", "scene"}
+    wanted : {"dataset", "lens", "look", "project", "scene"}
 
     Raises
     ------
@@ -44,6 +44,11 @@ def refuse_other_kind(path: str | Path, table: dict[str, Any], wanted: Kind) -> 
         raise ValueError(
             f"{path} is a look, not a {wanted} file: apply it to a lens with flarewright render LENS --light X,Y "
             f"--look {path}"
+        )
+    if kind == "dataset" != wanted:
+        raise ValueError(
+            f"{path} is a specification of a data set, not a {wanted} file: draw it with flarewright dataset {path} "
+            "-n 100 -o FOLDER"
         )
     if kind is not None and kind != wanted:
         use = f", render it with flarewright render --project {path}" if kind == "project" else ""
@@ -63,7 +68,9 @@ def kind_of(table: dict[str, Any]) -> Kind | None:
     kinds: list[Kind] = []
     if isinstance(table.get("rows"), list) and "lights" not in table:
         kinds.append("lens")
-    if "lens" in table and "rows" not in table:
+    if "lens" in table and "rows" not in table and isinstance(table["lens"], dict) and "names" in table["lens"]:
+        kinds.append("dataset")
+    elif "lens" in table and "rows" not in table:
         # a project has no name
         kinds.append("look" if "name" in table else "project")
     if "cameras" in table:

@@ -11,5 +11,6 @@
 - `picture`: `read_picture`, any colour picture as linear RGB; `decode_srgb`
 - `plate_image`: `read_matte` and `read_depth`, holdouts
 - `png`: `write_png`, `encode_png`, `png_address`
+- `sample_png`: `encode_samples`, PNG files of 8 or 16 bits for training data
 - `thumbnails`: `thumbnail`, precomputed pictures of the library
 """

@@ -5,6 +5,8 @@
 - `animation`: `Curve`, a value over time, and `Timeline`, the frames of a shot
 - `art`: `Art` and its `Rule`, art direction
 - `camera`: `Camera`, sensor and picture size
+- `dataset`: `DatasetSpec`, the distributions of training pairs
+- `distribution`: `Distribution` of numbers and `Texts`, choices of texts
 - `design`: `Design`, `Bounds`, `GhostTarget`, settings of the lens design
 - `holdout`: `Holdout`, objects that hide lights
 - `light`: `Light`, its shapes and spectra

@@ -400,11 +400,16 @@ def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[
     """Sort paths by their flux in the picture, drawn at 1/16 of the resolution."""
     small = [downsampled(shot, 16) for shot in shots]
     flux = np.zeros(len(paths))
-    for k, path in enumerate(paths):
-        for shot in small:
+    for shot in small:
+        # the colours of all paths at once take a tenth of the time
+        colors = draft_colors(shot, paths)
+        for k, path in enumerate(paths):
             picture = np.zeros((shot.size_px[1], shot.size_px[0], 3))
             # ramps and blurs hardly change the order, so they are ignored
-            draw_overridden_draft(shot, path, art.get(path.name, PLAIN), picture)
+            if (changed := art.get(path.name)) is None:
+                draw_draft(shot, [path], picture, colors[k : k + 1])
+            else:
+                draw_overridden_draft(shot, path, changed, picture)
             sum_rows(picture, picture)
             flux[k] += luminance_weights(shot.colorspace) @ picture.sum(axis=(0, 1))
     return [int(k) for k in np.argsort(-flux, kind="stable")]

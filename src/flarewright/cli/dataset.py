@@ -1,0 +1,198 @@
+"""`flarewright dataset`: draw training pairs for the removal and the detection of lens flare."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..errors import ProjectError
+from .common import check_place, first_run_bar, print_json, print_remarks, progress_bar
+
+if TYPE_CHECKING:
+    from ..model import Project
+    from ..model.project.dataset import DatasetSpec
+    from ..workflow.training_pairs.item import ItemResult
+
+EPILOG = (
+    "Examples:\n\nflarewright dataset --example > pairs.toml\n\n"
+    "flarewright dataset pairs.toml --preview sheet.png\n\n"
+    "flarewright dataset pairs.toml -n 10000 -o pairs"
+)
+# items of a contact sheet, unless -n states another number
+_PREVIEWED, _MOST_PREVIEWED = 8, 64
+
+
+def dataset(
+    spec: Annotated[Path | None, typer.Argument(metavar="SPEC.toml", help="The distributions to draw from.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder of the data set.")
+    ] = None,
+    items: Annotated[
+        int | None, typer.Option("-n", "--items", min=1, help="Number of items (default: 100; of a preview 8).")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed (default: that of the specification).")] = None,
+    preview: Annotated[
+        Path | None,
+        typer.Option(metavar="SHEET.png", help="Write a contact sheet of the first items instead of a data set."),
+    ] = None,
+    example: Annotated[bool, typer.Option("--example", help="Print a specification to start from, and exit.")] = False,
+    processes: Annotated[int | None, typer.Option(min=1, help="Number of processes (default: one per core).")] = None,
+    threads: Annotated[
+        int | None, typer.Option(min=1, help="Threads of all processes together (default: one per core).")
+    ] = None,
+    chunk: Annotated[
+        str | None, typer.Option(metavar="I/N", help="Draw part I of N of the items, for render farms.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print a summary as one JSON object.")] = False,
+) -> None:
+    """Draw training pairs for the removal and the detection of lens flare, from distributions in a file.
+
+    Finished items are kept: the same command resumes, and a larger -n adds items. On a terminal a bar shows the
+    progress; elsewhere stderr gets one line of JSON for each item.
+    """
+    if example:
+        _print_example({"SPEC.toml": spec, "-o": output, "-n": items, "--seed": seed, "--preview": preview})
+        return
+    if spec is None:
+        raise ProjectError("a specification is missing; flarewright dataset --example > pairs.toml writes one")
+    if (output is None) == (preview is None):
+        what = "--preview and -o are two outputs" if output else "there is no output"
+        raise ProjectError(f"{what}; give -o FOLDER for a data set, or --preview SHEET.png for a contact sheet")
+    settings = _settings(spec, seed)
+    started = time.monotonic()
+    if preview is not None:
+        _preview(settings, preview, spec, items, threads, {"--chunk": chunk, "--processes": processes}, as_json)
+        return
+    assert output is not None
+    from ..workflow.training_pairs.run import dataset as draw
+
+    with _progress() as report:
+        result = draw(
+            settings,
+            output,
+            items=100 if items is None else items,
+            chunk=chunk,
+            processes=processes,
+            threads=threads,
+            report=report,
+            prepare=_compile,
+        )
+    print_remarks(result.remarks)
+    seconds = time.monotonic() - started
+    if as_json:
+        print_json(
+            {
+                "folder": result.folder,
+                "items": result.items,
+                "drawn": result.drawn,
+                "kept": result.kept,
+                "splits": result.splits,
+                "lenses": result.lenses,
+                "complete": result.complete,
+                "processes": result.processes,
+                "seconds": round(seconds, 3),
+                "remarks": list(result.remarks),
+            }
+        )
+        return
+    words = [f"drew {result.drawn} items in {seconds:.1f} s"] if result.drawn else []
+    words += [f"kept {result.kept} that the same specification made"] if result.kept else []
+    words += [f"{number} {split}" for split, number in result.splits.items()]
+    print_remarks([f"{result.folder}: {', '.join(words) or 'no item was to be drawn'}"])
+
+
+def _print_example(others: dict[str, object]) -> None:
+    from ..io.project.dataset_file import EXAMPLE
+
+    if idle := [name for name, value in others.items() if value is not None]:
+        raise ProjectError(f"--example only prints a specification; leave {idle[0]} out")
+    sys.stdout.write(EXAMPLE)
+
+
+def _settings(path: Path, seed: int | None) -> DatasetSpec:
+    from ..io.project.dataset_file import read_dataset_spec
+
+    settings = read_dataset_spec(path)
+    if seed is None:
+        return settings
+    if seed >= 2**63:
+        raise ProjectError(f"--seed {seed} is too large; choose one below {2**63}")
+    changed: DatasetSpec = settings.replace(seed=seed)
+    return changed
+
+
+def _preview(
+    settings: DatasetSpec,
+    preview: Path,
+    spec: Path,
+    items: int | None,
+    threads: int | None,
+    others: dict[str, object],
+    as_json: bool,
+) -> None:
+    """Write a contact sheet."""
+    from ..io.images.png import write_png
+    from ..workflow.training_pairs.draw import draw_item
+    from ..workflow.training_pairs.preview import preview_picture
+
+    if idle := [name for name, value in others.items() if value is not None]:
+        raise ProjectError(f"{idle[0]} has no effect on a contact sheet; leave it out")
+    number = _PREVIEWED if items is None else items
+    if number > _MOST_PREVIEWED:
+        raise ProjectError(f"a contact sheet has at most {_MOST_PREVIEWED} items; choose a smaller -n than {number}")
+    check_place(preview, ".png")
+    from ..kernels.jit.warmup_processes import cores
+
+    _compile(draw_item(settings, 0).project, threads or cores())
+    with progress_bar() as begin:
+        bar = begin("preview")
+        sheet = preview_picture(
+            settings, number, threads=threads, report=lambda done, of: bar(done / of, f"item {done} of {of}")
+        )
+    write_png(preview, sheet, {"Description": f"first {number} items of {spec.name}"})
+    if as_json:
+        print_json({"preview": str(preview), "items": number})
+    else:
+        print_remarks([f"wrote {preview}"])
+
+
+def _compile(project: Project, threads: int) -> None:
+    """Compile the kernels of an item, once for all processes."""
+    from ..render.warmup import compile_for_render
+
+    compile_for_render(project, threads, lambda sentence: print_remarks([sentence]), first_run_bar)
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[ItemResult, int, int], None]]:
+    """Show a bar on a terminal; elsewhere print one JSON object per item to stderr."""
+    if sys.stderr.isatty():
+        with progress_bar() as begin:
+            bar = begin("dataset")
+            yield lambda result, done, of: bar(done / of, f"item {result.index}, {done} of {of}")
+        return
+    started = time.monotonic()
+    # the first item also waits for kernels and processes, and kept ones take no time: neither predicts the others
+    first_s, later = 0.0, -1
+
+    def line(result: ItemResult, done: int, of: int) -> None:
+        nonlocal first_s, later
+        seconds = time.monotonic() - started
+        later += result.drawn
+        first_s = seconds if later == 0 and result.drawn else first_s
+        left_s = round((seconds - first_s) / later * (of - done), 3) if later > 0 else None
+        state = "drawn" if result.drawn else "kept"
+        data = {
+            "item": result.index, "split": result.split, "state": state, "done": done, "of": of,
+            "seconds": round(seconds, 3), "left_s": left_s,
+        }  # fmt: skip
+        print(json.dumps(data), file=sys.stderr, flush=True)
+
+    yield line

@@ -1,0 +1,181 @@
+"""Masks of training pairs: which pixels show a light itself, and which show a ghost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model import Layer, Light
+from ...optics.colour.rgb import brightest_channel, luminance_weights, xyz_to_rgb_matrix
+from ...optics.colour.spectrum import spectrum_xyz
+from ...typing import Floats, Pixels
+
+# radius of a disc with the area of a pixel: a point's image
+_POINT_PX = 0.5642
+
+
+@dataclass(frozen=True)
+class LightImage:
+    """The sharp image of a light.
+
+    Attributes
+    ----------
+    number : int
+        From 1.
+    place_px : tuple of float
+        Column and row of its centre; the first pixel's centre is (0.5, 0.5).
+    radius_px : float
+    radiance : ndarray, shape (3,)
+        Linear Rec.709, in the unit of the background.
+    """
+
+    number: int
+    place_px: tuple[float, float]
+    radius_px: float
+    radiance: Floats
+
+    def inside(self, size_px: tuple[int, int]) -> bool:
+        """Return whether the centre is in the picture."""
+        return all(0.0 <= at < side for at, side in zip(self.place_px, size_px, strict=True))
+
+    def coverage(self, size_px: tuple[int, int]) -> tuple[tuple[slice, slice], Pixels]:
+        """Return the window of the disc, and the part of each of its pixels that the disc covers (to about 1 %)."""
+        reach = self.radius_px + 1.0
+        spans = [
+            (max(0, int(np.floor(at - reach))), min(side, int(np.ceil(at + reach))))
+            for at, side in zip(self.place_px, size_px, strict=True)
+        ]
+        (left, right), (top, bottom) = ((low, max(low, high)) for low, high in spans)
+        x = np.arange(left, right) + 0.5 - self.place_px[0]
+        y = np.arange(top, bottom) + 0.5 - self.place_px[1]
+        far = np.hypot(x[None, :], y[:, None])
+        return (slice(top, bottom), slice(left, right)), np.clip(self.radius_px - far + 0.5, 0.0, 1.0).astype("f4")
+
+
+def light_image(
+    light: Light,
+    number: int,
+    place_mm: Sequence[float],
+    efl: float,
+    size_px: tuple[int, int],
+    sensor_mm: Sequence[float],
+) -> LightImage:
+    """Return the sharp image of a light.
+
+    Parameters
+    ----------
+    light : Light
+        Its intensity is in the unit of the background, times steradians.
+    number : int
+    place_mm : sequence of float
+        Right and up from the middle of the sensor, from the traced direct image.
+    efl : float
+        Focal length, mm.
+    size_px, sensor_mm
+        Of the picture.
+
+    Returns
+    -------
+    LightImage
+        A point's is a disc with the area of a pixel, with the same irradiance.
+    """
+    zoom = size_px[0] / sensor_mm[0]
+    place = (0.5 * size_px[0] + place_mm[0] * zoom, 0.5 * size_px[1] - place_mm[1] * size_px[1] / sensor_mm[1])
+    radius = max(_POINT_PX, efl * float(np.tan(np.radians(0.5 * light.diameter_deg))) * zoom)
+    steradians = np.pi * (radius / zoom / efl) ** 2
+    # of luminance one; deep reds lie outside Rec.709
+    rgb = np.maximum(xyz_to_rgb_matrix("rec709") @ spectrum_xyz(light.spectrum), 0.0)
+    return LightImage(number, place, radius, light.intensity / steradians * rgb)
+
+
+def light_mask(images: Sequence[LightImage], starburst: Pixels) -> NDArray[np.uint8]:
+    """Return the number of the light that each pixel shows, 0 for none.
+
+    Parameters
+    ----------
+    images : sequence of LightImage
+    starburst : ndarray, shape (H, W, 3)
+        White at 1.
+
+    Returns
+    -------
+    ndarray, shape (H, W), uint8
+        A light covers its sharp image, and the largest disc around it in which the starburst clips everywhere: its
+        spikes are flare. Where two lights do, the nearest counts.
+    """
+    high, wide = starburst.shape[:2]
+    found = np.zeros((high, wide), np.uint8)
+    nearest = np.full((high, wide), np.inf, np.float32)
+    dark = np.flatnonzero(brightest_channel(starburst) < 1.0)
+    y, x = np.arange(high, dtype="f4")[:, None] + 0.5, np.arange(wide, dtype="f4")[None, :] + 0.5
+    for image in images:
+        far = np.hypot(x - np.float32(image.place_px[0]), y - np.float32(image.place_px[1]))
+        radius = image.radius_px
+        if image.inside((wide, high)):
+            # at least the pixel in which a small disc lies
+            radius = max(radius, float(far.min()) + 1e-3)
+            radius = max(radius, float(far.ravel()[dark].min(initial=far.max() + 1.0)) - 0.5)
+        mine = (far < radius) & (far < nearest)
+        found[mine], nearest[mine] = image.number, far[mine]
+    return found
+
+
+def ghost_mask(
+    ghosts: Sequence[Layer], size_px: tuple[int, int], scale: float, threshold: float
+) -> tuple[NDArray[np.uint8], list[dict[str, Any]]]:
+    """Return which ghost each pixel shows, and a list of the ghosts.
+
+    Parameters
+    ----------
+    ghosts : sequence of Layer
+        Single ghosts, "ghost.7-3".
+    size_px : tuple of int
+    scale : float
+        Multiplies their pixels; white is then 1.
+    threshold : float
+        A ghost covers the pixels where its luminance is at least this.
+
+    Returns
+    -------
+    mask : ndarray, shape (H, W), uint8
+        Identifier of the brightest ghost that covers the pixel, 0 for none.
+    listed : list of dict
+        The ghosts that cover any pixel, by falling flux: "id" from 1, "name", "box" [left, top, width, height] and
+        "pixels" of its whole area, also where another ghost is brighter, "peak" and "mean" luminance there.
+    """
+    weights = (luminance_weights("rec709") * scale).astype(np.float32)
+    mask = np.zeros((size_px[1], size_px[0]), np.uint8)
+    best = np.zeros((size_px[1], size_px[0]), np.float32)
+    listed: list[dict[str, Any]] = []
+    planes = [(layer, layer.pixels @ weights) for layer in ghosts]
+    planes.sort(key=lambda pair: -float(pair[1].sum(dtype=np.float64)))
+    for layer, plane in planes:
+        x, y, wide, high = layer.window
+        left, top, right, bottom = max(x, 0), max(y, 0), min(x + wide, size_px[0]), min(y + high, size_px[1])
+        seen = plane[top - y : max(top, bottom) - y, left - x : max(left, right) - x]
+        covers = seen >= threshold
+        if not covers.any():
+            continue
+        rows, columns = np.flatnonzero(covers.any(axis=1)), np.flatnonzero(covers.any(axis=0))
+        light = seen[covers]
+        listed.append(
+            {
+                "id": len(listed) + 1,
+                "name": layer.name.removeprefix("ghost."),
+                "box": [
+                    left + int(columns[0]), top + int(rows[0]),
+                    int(columns[-1] - columns[0]) + 1, int(rows[-1] - rows[0]) + 1,
+                ],
+                "pixels": int(light.size),
+                "peak": float(light.max()),
+                "mean": float(light.mean(dtype=np.float64)),
+            }
+        )  # fmt: skip
+        inside = (slice(top, bottom), slice(left, right))
+        brighter = covers & (seen > best[inside])
+        mask[inside][brighter], best[inside][brighter] = len(listed), seen[brighter]
+    return mask, listed

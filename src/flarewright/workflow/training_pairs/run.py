@@ -1,0 +1,394 @@
+"""Draw a data set of training pairs: a list of items that do not depend on each other."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..._version import __version__
+from ...errors import FileError, OutputError, ProjectError
+from ...io.files.atomic_write import write_atomically
+from ...io.files.tar_members import join_parts
+from ...io.files.text_file import digest_of, read_bytes, read_json
+from ...io.project.dataset_file import read_dataset_spec
+from ...io.project.named_files import picture_files
+from ...jobs.frame_list import chunk_of, parse_chunk
+from ...jobs.processes import shares, work_off
+from ...model import Project
+from ...model.project.dataset import SPLITS, DatasetSpec
+from ...render.scene.resolve import open_lens
+from .background import list_backgrounds
+from .draw import check_lenses, draw_item, lens_of, splits_of
+from .item import DatasetPlan, ItemResult, fragment, item_record, write_item
+from .layout import read_record
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+_WRITE = "flarewright.workflow.training_pairs.item:write_item"
+MOST_ITEMS = 10_000_000
+# memory of a process: that of a tiny picture, and some 40 pictures while one item is drawn and written
+_PROCESS_BYTES, _PIXEL_BYTES = 350_000_000, 480
+_LARGEST_RECORDS = 2_000_000_000
+# items whose kernels are compiled before processes start
+_COMPILED = 6
+
+
+@dataclass(frozen=True)
+class DatasetResult:
+    """What became of a data set.
+
+    Attributes
+    ----------
+    folder : str
+    items : int
+        Of the whole data set.
+    drawn, kept : int
+        Of this call.
+    splits : dict of str to int
+        Items of this call by split.
+    lenses : dict of str to str
+        The split of each lens.
+    complete : bool
+        Whether all items are there and the manifest is written.
+    processes : int
+    remarks : tuple of str
+    """
+
+    folder: str
+    items: int
+    drawn: int
+    kept: int
+    splits: dict[str, int]
+    lenses: dict[str, str]
+    complete: bool
+    processes: int
+    remarks: tuple[str, ...]
+
+
+def dataset(
+    spec: DatasetSpec | str | PathLike[str],
+    output: str | PathLike[str],
+    *,
+    items: int = 100,
+    chunk: str | None = None,
+    processes: int | None = None,
+    threads: int | None = None,
+    report: Callable[[ItemResult, int, int], None] | None = None,
+    prepare: Callable[[Project, int], None] | None = None,
+) -> DatasetResult:
+    """Draw training pairs: pictures with and without flare, their layers, masks and parameters.
+
+    Items that the same specification and version have made are kept, so that a repeated call resumes, and a larger
+    number of items adds to the set. The bytes of an item depend on the specification and its number alone.
+
+    Parameters
+    ----------
+    spec : DatasetSpec or path
+        A specification, or its TOML file (`flarewright.read_dataset_spec`).
+    output : path
+        Folder of the data set; it is made if it does not exist.
+    items : int
+        Number of items.
+    chunk : str, optional
+        "2/5": draw only the second of five parts.
+    processes : int, optional
+        None: one a core, as the memory allows.
+    threads : int, optional
+        Threads of all processes together; None: the cores.
+    report : callable, optional
+        Called after each item with its result, the number of finished items and the number of all.
+    prepare : callable, optional
+        Called with projects and the number of threads before processes start: the command line compiles kernels here.
+
+    Returns
+    -------
+    DatasetResult
+
+    Raises
+    ------
+    FlarewrightError
+        The specification, a lens or a background cannot be used, the folder holds something else, a file cannot be
+        written, or a process was lost.
+    MemoryError
+        There is too little memory for an item.
+
+    Examples
+    --------
+    >>> from flarewright import dataset
+    >>> dataset("pairs.toml", "pairs", items=1000).complete                             # doctest: +SKIP
+    True
+    """
+    plan = plan_of(spec, output)
+    if not 1 <= items <= MOST_ITEMS:
+        raise ProjectError(f"{items} items are not possible; give 1 to {MOST_ITEMS}")
+    settings = plan.spec
+    mine: Sequence[int] = range(items)
+    units: Sequence[range] = _units(settings, items)
+    if chunk is not None:
+        # tar files are units: two machines must not write one
+        units = chunk_of(units, *parse_chunk(chunk))
+        mine = [index for unit in units for index in unit]
+    _claim(plan, items)
+    if not mine:
+        return _result(plan, items, [], 0, [f"chunk {chunk} of {items} items is empty"])
+    packed = [unit for unit in units if settings.layout == "webdataset" and _is_packed(plan, unit)]
+    done = [ItemResult(index, _split(settings, index), False) for unit in packed for index in unit]
+    ready = {one.index for one in done}
+    todo = [index for index in mine if index not in ready]
+    number, each = shares(len(todo), processes or _fitting(plan, threads), threads)
+    if prepare is not None and todo:
+        for index in todo[:: max(1, len(todo) // _COMPILED)][:_COMPILED]:
+            prepare(draw_item(settings, index).project, number * each)
+    open_units = {index: unit for unit in units for index in unit} if settings.layout == "webdataset" else {}
+    missing = {id(unit): len(unit) for unit in units}
+    for one in work_off(_WRITE, plan, todo, processes=number, threads=each, what="item"):
+        done.append(one.result)
+        if (unit := open_units.get(one.item)) is not None:
+            missing[id(unit)] -= 1
+            if missing[id(unit)] == 0:
+                _pack(plan, unit)
+        if report is not None:
+            report(one.result, len(done), len(mine))
+    remarks = []
+    if (many := _write_manifest(plan, items)) > 0:
+        remarks.append(f"{many} of {items} items are not drawn yet; the manifest is written when all are")
+    return _result(plan, items, done, number if todo else 0, remarks, complete=many == 0)
+
+
+def plan_of(spec: DatasetSpec | str | PathLike[str], output: str | PathLike[str]) -> DatasetPlan:
+    """Return what all items share; raises an error now for lenses and backgrounds that cannot be used."""
+    settings = spec if isinstance(spec, DatasetSpec) else read_dataset_spec(spec)
+    check_lenses(settings)
+    backgrounds = list_backgrounds(settings)
+    return DatasetPlan(settings, os.fspath(output), backgrounds, _digest(settings, backgrounds))
+
+
+def _digest(spec: DatasetSpec, backgrounds: Sequence[str]) -> str:
+    """Return a digest of all that determines the items: version, specification, lenses, backgrounds."""
+    folder = Path(spec.background.folder or ".")
+    lenses: dict[str, str] = {}
+    images: set[str] = set()
+    for name in spec.lens.names.choice:
+        lens = open_lens(name).lens
+        lenses[name] = sha256(lens.model_dump_json().encode()).hexdigest()
+        images.update(picture_files(lens))
+    coatings = [text for text in spec.lens.coating.choice if text.lower().endswith(".toml")]
+    made_of = {
+        "version": __version__,
+        # the place of the backgrounds does not matter
+        "spec": spec.model_dump(mode="json", exclude={"background": {"folder"}}),
+        "lenses": lenses,
+        "files": {name: digest_of(name) for name in sorted({*images, *coatings})},
+        "backgrounds": [[name, (folder / name).stat().st_size] for name in backgrounds],
+    }
+    return sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()
+
+
+def _split(spec: DatasetSpec, index: int) -> str:
+    return splits_of(spec)[lens_of(spec, index)]
+
+
+def _units(spec: DatasetSpec, items: int) -> list[range]:
+    """Return the items of each tar file, or single items."""
+    step = spec.items_per_shard if spec.layout == "webdataset" else 1
+    return [range(first, min(first + step, items)) for first in range(0, items, step)]
+
+
+def _claim(plan: DatasetPlan, items: int) -> None:
+    """Make the folder, or check that it holds a part of the same data set; record what it holds."""
+    folder = Path(plan.folder)
+    about = folder / "dataset.json"
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"cannot write {folder}: it is a file; give the name of a folder")
+    if not folder.parent.is_dir():
+        raise OutputError(f"cannot write {folder}: the folder {folder.parent} does not exist; create it first")
+    if folder.exists() and any(folder.iterdir()):
+        held = _held(about)
+        if held is None:
+            raise OutputError(f"{folder} holds other files; give a new or empty folder for the data set")
+        if held.get("digest") != plan.digest:
+            why = "" if held.get("version") == __version__ else f", by version {held.get('version')}"
+            raise OutputError(
+                f"{folder} holds a data set of another specification{why}; give another folder, or remove that one"
+            )
+        if isinstance(count := held.get("items"), int) and count > items:
+            raise OutputError(f"{folder} holds a data set of {count} items; give -n {count} or more, or another folder")
+    else:
+        with suppress(FileExistsError):
+            try:
+                folder.mkdir()
+            except PermissionError:
+                raise OutputError(f"cannot make the folder {folder}: check the permissions of its parent") from None
+    spec = plan.spec
+    data = {
+        "schema_version": 1, "version": __version__, "digest": plan.digest, "items": items, "layout": spec.layout,
+        "splits": splits_of(spec), "spec": spec.model_dump(mode="json"),
+    }  # fmt: skip
+    text = json.dumps(data, indent=2) + "\n"
+    write_atomically(about, lambda temporary: _text(temporary, text))
+
+
+def _text(path: Path, text: str) -> None:
+    path.write_text(text, "utf-8")
+
+
+def _held(about: Path) -> dict[str, Any] | None:
+    """Return the description in a data set's folder, or None if it is no data set."""
+    try:
+        data = read_json(about, "the description of a data set")
+    except FileError:
+        return None
+    return data if isinstance(data, dict) and "digest" in data else None
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Tar files
+
+
+def _shard(plan: DatasetPlan, unit: range, split: str, suffix: str) -> Path:
+    number = unit.start // plan.spec.items_per_shard
+    return Path(plan.folder) / f"{split}-{number:06d}.{suffix}"
+
+
+def _by_split(spec: DatasetSpec, unit: range) -> dict[str, list[int]]:
+    """Return the items of a tar file by split, without empty splits."""
+    found: dict[str, list[int]] = {split: [] for split in SPLITS}
+    for index in unit:
+        found[_split(spec, index)].append(index)
+    return {split: indices for split, indices in found.items() if indices}
+
+
+def _is_packed(plan: DatasetPlan, unit: range) -> bool:
+    """Return whether the tar files of these items are complete; they were written after their records."""
+    for split, indices in _by_split(plan.spec, unit).items():
+        records = list(_records(_shard(plan, unit, split, "jsonl")))
+        if [record.get("index") for _, record in records] != indices:
+            return False
+        if any(record.get("digest") != plan.digest for _, record in records):
+            return False
+        size = _tar_bytes(records)
+        path = _shard(plan, unit, split, "tar")
+        if not path.is_file() or path.stat().st_size != size:
+            return False
+    return True
+
+
+def _tar_bytes(records: Sequence[tuple[bytes, dict[str, Any]]]) -> int:
+    """Return the size of the tar file of some records: a header and whole blocks for each member, and the end."""
+    total = 1024
+    for line, record in records:
+        for size in (*(about["bytes"] for about in record["files"].values()), len(line)):
+            total += 512 + -(-size // 512) * 512
+    return total
+
+
+def _pack(plan: DatasetPlan, unit: range) -> None:
+    """Join the finished items of a tar file, and remove them."""
+    for split, indices in _by_split(plan.spec, unit).items():
+        lines = [item_record(plan, index, split) for index in indices]
+        _write_lines(_shard(plan, unit, split, "jsonl"), [line for line in lines if line is not None])
+        join_parts(_shard(plan, unit, split, "tar"), [fragment(plan, index) for index in indices])
+    for index in unit:
+        fragment(plan, index).unlink(missing_ok=True)
+    with suppress(OSError):
+        plan.staging.rmdir()
+
+
+def _write_lines(path: Path, lines: Sequence[bytes]) -> None:
+    def write(temporary: Path) -> None:
+        temporary.write_bytes(b"".join(lines))
+
+    write_atomically(path, write)
+
+
+def _records(path: Path) -> Iterator[tuple[bytes, dict[str, Any]]]:
+    """Yield the lines of a file of records that can be read."""
+    try:
+        data = read_bytes(path, "the records of a tar file", _LARGEST_RECORDS)
+    except FileError:
+        return
+    for line in data.splitlines(keepends=True):
+        if (record := read_record(line)) is not None:
+            yield line, record
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Manifest
+
+
+def _write_manifest(plan: DatasetPlan, items: int) -> int:
+    """Write the records of all items in their order, or return how many are missing."""
+    missing = 0
+
+    def write(temporary: Path) -> None:
+        nonlocal missing
+        with temporary.open("wb") as file:
+            for line in _all_records(plan, items):
+                if line is None:
+                    missing += 1
+                else:
+                    file.write(line)
+        if missing:
+            raise _IncompleteError
+
+    with suppress(_IncompleteError):
+        write_atomically(Path(plan.folder) / "manifest.jsonl", write)
+    return missing
+
+
+class _IncompleteError(Exception):
+    """Items are missing; the manifest is not written."""
+
+
+def _all_records(plan: DatasetPlan, items: int) -> Iterator[bytes | None]:
+    spec = plan.spec
+    if spec.layout != "webdataset":
+        for index in range(items):
+            yield item_record(plan, index, _split(spec, index))
+        return
+    for unit in _units(spec, items):
+        lines = {
+            record.get("index"): line
+            for split in SPLITS
+            for line, record in _records(_shard(plan, unit, split, "jsonl"))
+            if record.get("digest") == plan.digest
+        }
+        yield from (lines.get(index) for index in unit)
+
+
+def _result(
+    plan: DatasetPlan, items: int, done: Sequence[ItemResult], processes: int, remarks: Sequence[str], *,
+    complete: bool = False,
+) -> DatasetResult:  # fmt: skip
+    drawn = sum(one.drawn for one in done)
+    return DatasetResult(
+        plan.folder,
+        items,
+        drawn,
+        len(done) - drawn,
+        {split: sum(one.split == split for one in done) for split in SPLITS if any(one.split == split for one in done)},
+        splits_of(plan.spec),
+        complete,
+        processes,
+        tuple(remarks),
+    )
+
+
+def _fitting(plan: DatasetPlan, threads: int | None) -> int:
+    """Return how many processes the cores, or the wanted threads, and the free memory allow."""
+    from ...kernels.jit.warmup_processes import cores
+    from ...render.scene.memory_check import spare_bytes
+
+    width, height = plan.spec.size_px
+    each = _PROCESS_BYTES + width * height * _PIXEL_BYTES
+    return max(1, int(min(threads or cores(), spare_bytes() / each)))
+
+
+__all__ = ["DatasetResult", "dataset", "plan_of", "write_item"]
