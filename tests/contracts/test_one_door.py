@@ -23,6 +23,7 @@ ALLOWED = {
     ("editor/session/autosave_lock.py", ".open"),
     ("io/files/file_lock.py", "path.open"),
     ("io/files/silence_libraries.py", "os.open"),
+    ("io/files/tar_members.py", "tarfile.open"),
     ("io/images/exr.py", "OpenEXR.File"),
     ("io/images/mask_image.py", "Image.open"),
     ("io/images/thumbnails.py", "path.read_bytes"),
@@ -36,6 +37,8 @@ ALLOWED = {
     ("kernels/jit/roots.py", ".read_text"),
     ("measure/core/checkpoint.py", "path.open"),
     ("render/scene/memory_check.py", "MEMINFO.read_text"),
+    ("workflow/training_pairs/layout.py", "path.read_bytes"),
+    ("workflow/training_pairs/sensor.py", "Image.open"),
 }
 
 

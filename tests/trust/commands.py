@@ -33,6 +33,7 @@ ARGUMENTS: dict[str, tuple[str, ...]] = {
         "--json",
     ),
     "nuke-script": ("flare.exr", "-o", "flare.nk", "--json"),
+    "dataset": ("pairs.toml", "-n", "1", "-o", "pairs", "--processes", "1", "--json"),
     "ghosts": ("tessar-brendel", "--light", "5,3", "--json"),
     "predict": ("tessar-brendel", "--samples", "5", "--quality", "draft", "--json"),
     "lenses": (),

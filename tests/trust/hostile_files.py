@@ -37,6 +37,7 @@ READERS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("shot.toml", ("project", "check", "shot.toml")),
     ("shot.toml", ("design", "solve", "shot.toml", "-o", "found", "--time", "0.1")),
     ("match.toml", ("scene", "check", "match.toml")),
+    ("pairs.toml", ("dataset", "pairs.toml", "-n", "1", "-o", "new_pairs", "--processes", "1")),
     ("warm.toml", ("looks", "save", "warm.toml", "-o", "new.toml")),
     ("look.toml", (*RENDER, "--look", "look.toml")),
     ("spectrum.csv", (*RENDER, "--spectrum", "spectrum.csv")),

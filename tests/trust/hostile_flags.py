@@ -56,6 +56,7 @@ BESIDE: dict[str, tuple[str, ...]] = {
     "--error-of": ("--quality", "reference", "--error", "0.2"), "--order4-limit": ("--orders", "4"),
     "--iso": ("--shutter", "1/250"), "--lux": ("--shutter", "1/250"),
 }  # fmt: skip
+PAIRS = 'size_px = [32, 18]\n[lens]\nnames = ["tessar-brendel"]\nstops_down = { uniform = [3, 4] }\n'
 
 
 @cache
@@ -88,6 +89,7 @@ def prepare(folder: Path) -> None:
     shot = folder / "shot.toml"
     shot.write_text(shot.read_text("utf-8") + target, "utf-8")
     write_lens(fw.load_lens("tessar-brendel"), folder / "lens.toml")
+    (folder / "pairs.toml").write_text(PAIRS, "utf-8")
     lights, camera = (fw.Light(field_deg=(5.0, 3.0)),), fw.Camera(size_px=(96, 54))
     small = fw.Project(lens="tessar-brendel", lights=lights, camera=camera, quality=fw.Quality(mode="draft"))
     fw.write_exr(folder / "flare.exr", fw.render(small).layers, (96, 54))

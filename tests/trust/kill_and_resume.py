@@ -71,6 +71,15 @@ size_px = [64, 36]
 [quality]
 mode = "draft"
 """
+PAIRS = """
+size_px = [64, 48]
+items_per_shard = 5
+[lens]
+names = ["heliar-tronnier", "triplet-pestrecov"]
+[splits]
+train = 1
+test = 1
+"""
 SEARCH = ("--searches", "3000", "--lenses", "1", "--time", "600")
 
 
@@ -226,6 +235,9 @@ TRIALS = {
     "library thumbnails": Trial(
         ("library", "thumbnails"), ("state/library/thumbnails/*.jpg",),
         prepare=lambda folder: (_lenses(folder), _run(folder, ("library", "add", "lenses")), None)[-1],
+    "dataset": Trial(
+        ("dataset", "pairs.toml", "-n", "24", "--processes", "2", "-o", "out"), ("out/*",),
+        prepare=lambda folder: (folder / "pairs.toml").write_text(PAIRS) and None,
     ),
     "gallery": Trial(("gallery", "-o", "out", "--size", "32x18"), ("out/*.png", "out/index.html")),
     "warm-up": Trial(("warm-up",), ("cache/*/*.nbi",)),

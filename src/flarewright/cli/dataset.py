@@ -58,7 +58,9 @@ def dataset(
     progress; elsewhere stderr gets one line of JSON for each item.
     """
     if example:
-        _print_example({"SPEC.toml": spec, "-o": output, "-n": items, "--seed": seed, "--preview": preview})
+        others: dict[str, object] = {"SPEC.toml": spec, "-o": output, "-n": items, "--seed": seed, "--preview": preview}
+        others |= {"--processes": processes, "--threads": threads, "--chunk": chunk, "--json": as_json or None}
+        _print_example(others)
         return
     if spec is None:
         raise ProjectError("a specification is missing; flarewright dataset --example > pairs.toml writes one")
@@ -68,7 +70,9 @@ def dataset(
     settings = _settings(spec, seed)
     started = time.monotonic()
     if preview is not None:
-        _preview(settings, preview, spec, items, threads, {"--chunk": chunk, "--processes": processes}, as_json)
+        if idle := [name for name, value in (("--chunk", chunk), ("--processes", processes)) if value is not None]:
+            raise ProjectError(f"{idle[0]} has no effect on a contact sheet; leave it out")
+        _preview(settings, preview, spec, items, threads, as_json)
         return
     assert output is not None
     from ..workflow.training_pairs.run import dataset as draw
@@ -134,7 +138,6 @@ def _preview(
     spec: Path,
     items: int | None,
     threads: int | None,
-    others: dict[str, object],
     as_json: bool,
 ) -> None:
     """Write a contact sheet."""
@@ -142,8 +145,6 @@ def _preview(
     from ..workflow.training_pairs.draw import draw_item
     from ..workflow.training_pairs.preview import preview_picture
 
-    if idle := [name for name, value in others.items() if value is not None]:
-        raise ProjectError(f"{idle[0]} has no effect on a contact sheet; leave it out")
     number = _PREVIEWED if items is None else items
     if number > _MOST_PREVIEWED:
         raise ProjectError(f"a contact sheet has at most {_MOST_PREVIEWED} items; choose a smaller -n than {number}")

@@ -67,10 +67,15 @@ def members(data: bytes) -> Iterator[tuple[str, bytes]]:
     ValueError
         They are damaged.
     """
-    end = b"" if data.endswith(_END) else _END
+    whole = data if data.endswith(_END) else data + _END
+    used = len(_END)
     try:
-        with tarfile.open(fileobj=BytesIO(data + end)) as archive:
+        with tarfile.open(fileobj=BytesIO(whole)) as archive:
             for member in archive:
+                used += tarfile.BLOCKSIZE * (1 + -(-member.size // tarfile.BLOCKSIZE))
+                # the end that was added must not fill a member that is cut short
+                if used > len(whole):
+                    raise ValueError(f"its member {member.name[:40]} is cut short")
                 file = archive.extractfile(member)
                 yield member.name, b"" if file is None else file.read()
     except tarfile.TarError as error:

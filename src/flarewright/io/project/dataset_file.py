@@ -61,7 +61,7 @@ light_in_clean = "core"   # or "image", "none"
 # parts = ["clean", "flared", "ghosts", "starburst", "light_mask", "ghost_mask"]   # default: all
 
 [lens]
-names = ["heliar-tronnier", "takumar-50-f1.4", "flektogon-35", "nikkor-85-f1.4", "canon-28-80", "triplet-pestrecov"]
+names = ["heliar-tronnier", "takumar-50-f1.4", "flektogon-35", "nikkor-85-f1.4", "canon-70-200", "triplet-pestrecov"]
 stops_down = { uniform = [0, 4] }   # or f_number
 zoom = { uniform = [0, 1] }         # 0 is the shortest focal length, 1 the longest
 coating = { choice = ["lens", "early-multicoat", "quarter-wave:550", "none"], weights = [4, 3, 2, 1] }

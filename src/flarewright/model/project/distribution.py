@@ -170,16 +170,17 @@ def _spelt_out(value: Any) -> Any:
 
 def _kind(value: Any) -> str:
     names = value if isinstance(value, dict) else type(value).model_fields
-    return next(kind for kind in KINDS if kind in names)
+    # a tag that is no key: messages leave tags out of the place
+    return next(f"{kind} kind" for kind in KINDS if kind in names)
 
 
 Distribution = Annotated[
-    Annotated[Constant, Tag("constant")]
-    | Annotated[Choice, Tag("choice")]
-    | Annotated[Uniform, Tag("uniform")]
-    | Annotated[LogUniform, Tag("log_uniform")]
-    | Annotated[Normal, Tag("normal")]
-    | Annotated[Integers, Tag("integers")],
+    Annotated[Constant, Tag("constant kind")]
+    | Annotated[Choice, Tag("choice kind")]
+    | Annotated[Uniform, Tag("uniform kind")]
+    | Annotated[LogUniform, Tag("log_uniform kind")]
+    | Annotated[Normal, Tag("normal kind")]
+    | Annotated[Integers, Tag("integers kind")],
     Discriminator(_kind),
     BeforeValidator(_spelt_out),
 ]

@@ -89,8 +89,9 @@ def background_of(spec: DatasetSpec, index: int, names: Sequence[str]) -> tuple[
         return _synthetic(spec.size_px, rng), {"synthetic": True}
     name = names[int(rng.integers(len(names)))]
     assert spec.background.folder is not None
+    path = Path(spec.background.folder) / name
     try:
-        whole = _read(Path(spec.background.folder) / name)
+        whole = _read(path, path.stat().st_mtime_ns if path.exists() else 0)
     except FlarewrightError as error:
         raise ProjectError(f"background {name}: {error}") from None
     box = _crop_box(whole.shape[:2], spec.size_px, draw_number(spec.background.crop, rng), rng)
@@ -102,7 +103,7 @@ def background_of(spec: DatasetSpec, index: int, names: Sequence[str]) -> tuple[
 
 
 @lru_cache(maxsize=8)
-def _read(path: Path) -> Pixels:
+def _read(path: Path, _: int) -> Pixels:
     """Read a picture; a few are kept, since a small folder serves many items."""
     pixels = np.maximum(read_picture(path), np.float32(0.0))
     pixels.flags.writeable = False

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import FlarewrightError
+from ...io.files.sentences import count
 from ...io.images.contact_sheet import Figure, sheet_picture
 from ...model.project.dataset import DatasetSpec
 from .background import list_backgrounds
@@ -70,7 +71,7 @@ def _row(index: int, drawn: Pictures) -> Iterator[Figure]:
         f"{index} {drawn.split}: flared",
         f"f/{record['f_number']:.3g}, {record['coating']}",
         str(record["lens"])[-34:],
-        f"{len(record['ghosts'])} ghosts, {len(record['lights'])} lights",
+        f"{count(len(record['ghosts']), 'ghost')}, {count(len(record['lights']), 'light')}",
     )
     for picture, title, column in zip(pictures, titles, _COLUMNS, strict=True):
         yield Figure("", title, "", "", f"{index}-{column}.png", _small(picture))
