@@ -27,6 +27,7 @@ from typing import Any
 
 import numba
 import numpy as np
+from benchmarks.dataset import pairs
 from benchmarks.design import design
 from benchmarks.lights import area, lights, surfaces
 from benchmarks.passes import passes
@@ -67,7 +68,7 @@ from flarewright.render.scene.shots import make_shots
 
 PARTS = (
     "yardsticks", "trace", "raster", "frame", "passes", "art", "built", "lights", "area", "surfaces", "scatter",
-    "ringing", "reference", "design", "residual", "startup", "memory", "small", "scaling", "suite",
+    "ringing", "reference", "design", "residual", "startup", "memory", "small", "dataset", "scaling", "suite",
 )  # fmt: skip
 
 LIGHT = (10.0, 5.0)
@@ -505,6 +506,7 @@ def main(arguments: list[str] | None = None) -> None:
         "startup": lambda: startup(given.repeat),
         "memory": memory,
         "small": lambda: small(row, given.repeat),
+        "dataset": lambda: pairs(row),
         "scaling": lambda: scaling(row, os.cpu_count() or 1),
         "suite": lambda: suite(row, scalar, given.repeat, given.lens, given.size),
     }

@@ -83,6 +83,7 @@ def test_an_impossible_distribution_is_one_sentence_with_its_place(text, sentenc
         ('parts = ["veil"]\n', "parts has veil, which needs [scatter]"),
         ('layout = "flare7k"\nformat = "png16"\n', "layout flare7k has 8-bit pictures"),
         ('layout = "folder"\nitems_per_shard = 9\n', "items_per_shard has no effect in layout folder"),
+        ("rings = true\n", 'rings = true needs quality = "final"'),
         ("size_px = [8, 8]\n", "8x8 is not between 16 and 8192 pixels a side"),
         ("schema_version = 2\n", "newer than this program's 1"),
     ],

@@ -53,7 +53,7 @@ EXAMPLE = """\
 schema_version = 1
 seed = 1
 size_px = [512, 512]
-quality = "draft"         # or "final": traced rays
+quality = "draft"         # or "final": traced rays; then also: rings
 layout = "webdataset"     # or "folder", "flare7k"
 items_per_shard = 250
 format = "png"            # or "png16", "jpeg", "exr"
@@ -205,6 +205,8 @@ def _contradictions(spec: DatasetSpec) -> list[str]:
         found.append('format = "exr" holds linear light: write tone = "linear" in [sensor]')
     if spec.format in ("exr", "png16") and sensor.jpeg_quality is not None:
         found.append(f'sensor.jpeg_quality makes 8-bit pictures, not {spec.format}; choose format = "png" or "jpeg"')
+    if spec.rings and spec.quality == "draft":
+        found.append('rings = true needs quality = "final"; drafts have sharp edges')
     if spec.scatter is None and spec.parts is not None and "veil" in spec.parts:
         found.append("parts has veil, which needs [scatter]; add it, or leave veil out")
     if spec.layout == "flare7k" and spec.parts is not None:

@@ -159,7 +159,7 @@ class LightDraws(Frozen):
         Irradiance of a light on a plane that faces it, in stops over pi times the mean luminance of the background: the
         sun at noon has about 3 over a sunlit scene, a lamp at night 0 to 6.
     temperature_k : Distribution
-        Of a black body.
+        Of a black body; drawn values are rounded to 100 K.
     diameter_deg : Distribution
         Angular diameter; 0 is a point.
     """
@@ -288,6 +288,8 @@ class DatasetSpec(Frozen):
     size_px : tuple of int
     quality : {"draft", "final"}
         draft: paraxial matrices; final: traced rays.
+    rings : bool
+        Diffraction rings inside ghosts (final quality), which take half of its time.
     layout : {"webdataset", "folder", "flare7k"}
         Tar files; a folder a part; or the folders of Flare7K.
     format : {"png", "png16", "jpeg", "exr"}
@@ -305,6 +307,7 @@ class DatasetSpec(Frozen):
     seed: int = Field(0, ge=0, lt=2**63)
     size_px: tuple[int, int] = (512, 512)
     quality: Literal["draft", "final"] = "draft"
+    rings: StrictBool = False
     layout: Literal["webdataset", "folder", "flare7k"] = "webdataset"
     format: Format = "png"
     items_per_shard: int = Field(250, ge=1, le=100_000)

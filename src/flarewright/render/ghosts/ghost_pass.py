@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...kernels.paraxial.ghosts import RIM
 from ...kernels.raster.polygons import sum_rows
 from ...model import Layer, Quality
 from ...optics.colour.rgb import luminance_weights
@@ -36,6 +37,7 @@ from .paraxial_ghosts import (
     draw_draft_by_detail,
     draw_overridden_draft,
     mark_spread,
+    matrix_fluxes,
     spread_light,
 )
 from .pupil_search import ghost_search, group_by_mirror
@@ -397,21 +399,25 @@ def _add_to(planes: list[Plane | None], detail: int, light: Floats) -> None:
 
 
 def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt]) -> list[int]:
-    """Sort paths by their flux in the picture, drawn at 1/16 of the resolution."""
-    small = [downsampled(shot, 16) for shot in shots]
+    """Sort paths by their flux in the picture: from matrices if nothing changes them, else drawn 1/16 as large."""
     flux = np.zeros(len(paths))
-    for shot in small:
-        # the colours of all paths at once take a tenth of the time
+    for shot in shots:
+        luminance = luminance_weights(shot.colorspace)
+        small = downsampled(shot, 16)
+        # a mask and an area light change how much light falls into the picture
+        plain = shot.opening.mask is None and shot.border is None
         colors = draft_colors(shot, paths)
-        for k, path in enumerate(paths):
-            picture = np.zeros((shot.size_px[1], shot.size_px[0], 3))
+        waves = len(shot.packed.n_gap)
+        found = matrix_fluxes(shot, paths, shot.packed.n_gap, shot.packed.reflectance, sides=RIM)[0]
+        # those that are dark at all traced wavelengths have weights beyond them
+        known = plain & ~colors[:, waves:].any(axis=(1, 2)) & np.array([path.name not in art for path in paths])
+        flux += np.where(known, shot.gain * (found[:, :, None] * colors[:, :waves]).sum(axis=1) @ luminance, 0.0)
+        for k in np.flatnonzero(~known).tolist():
+            picture = np.zeros((small.size_px[1], small.size_px[0], 3))
             # ramps and blurs hardly change the order, so they are ignored
-            if (changed := art.get(path.name)) is None:
-                draw_draft(shot, [path], picture, colors[k : k + 1])
-            else:
-                draw_overridden_draft(shot, path, changed, picture)
+            draw_overridden_draft(small, paths[k], art.get(paths[k].name, PLAIN), picture)
             sum_rows(picture, picture)
-            flux[k] += luminance_weights(shot.colorspace) @ picture.sum(axis=(0, 1))
+            flux[k] += luminance @ picture.sum(axis=(0, 1))
     return [int(k) for k in np.argsort(-flux, kind="stable")]
 
 

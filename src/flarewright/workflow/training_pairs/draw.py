@@ -30,8 +30,8 @@ _WAVELENGTHS = {"draft": 3, "final": 7}
 # Each group of values has a separate stream: a change to one distribution leaves the values of the other groups.
 LENS, IRIS, DIRT, SCATTER, LIGHTS, BACKGROUND, EXPOSURE, SENSOR, NOISE = range(9)
 
-# final: with the detail that a screen shows, as an editor's preview
-_FINAL = {"screen": True, "tolerance_px": 0.5}
+# of final pictures: the detail that a screen shows, as in a preview
+_FINAL = {"screen": True, "tolerance_px": 1.0}
 
 
 def stream(spec: DatasetSpec, index: int, group: int) -> np.random.Generator:
@@ -159,9 +159,7 @@ def draw_item(spec: DatasetSpec, index: int) -> Drawn:
         zoom=zoom,
         lights=(Light(field_deg=(0.0, 0.0)),),
         camera=Camera(size_px=spec.size_px, sensor_mm=(width_mm, width_mm * high / wide), focus_distance=focus),
-        quality=Quality(
-            mode=spec.quality, wavelengths=_WAVELENGTHS[spec.quality], **(_FINAL if spec.quality == "final" else {})
-        ),
+        quality=_quality(spec),
         output=Output(layers=_layers(spec), brightest=spec.masks.ghosts if _layers(spec) == "ghosts" else None),
         iris=_iris(spec, index, name),
         dirt=_dirt(spec, index),
@@ -180,6 +178,13 @@ def brightened(project: Project, mean_luminance: float) -> Project:
     lights = tuple(light.replace(intensity=light.intensity * scale) for light in project.lights)
     found: Project = project.replace(lights=lights)
     return found
+
+
+def _quality(spec: DatasetSpec) -> Quality:
+    return Quality(
+        mode=spec.quality, wavelengths=_WAVELENGTHS[spec.quality], ringing="collins" if spec.rings else "off",
+        **(_FINAL if spec.quality == "final" else {}),
+    )  # fmt: skip
 
 
 def _layers(spec: DatasetSpec) -> str:
@@ -260,11 +265,18 @@ def _lights(spec: DatasetSpec, index: int, efl: float, sensor_mm: tuple[float, f
                 name=f"light {number + 1}",
                 field_deg=field,
                 intensity=2.0 ** draw_number(draws.stops, rng),
-                spectrum=BlackBody(temperature_k=draw_number(draws.temperature_k, rng)),
+                spectrum=BlackBody(temperature_k=_rounded(draw_number(draws.temperature_k, rng), draws.temperature_k)),
                 diameter_deg=draw_number(draws.diameter_deg, rng),
             )
         )
     return tuple(found) or (Light(name="none", field_deg=(0.0, 0.0), intensity=0.0),)
+
+
+def _rounded(temperature_k: float, given: AnyDistribution) -> float:
+    """Return a temperature in steps of 100 K: the tables of each spectrum take as long as the rest of a draft."""
+    if isinstance(given, Constant | Choice):
+        return temperature_k
+    return float(np.clip(round(temperature_k, -2), *given.support))
 
 
 def check_lenses(spec: DatasetSpec) -> None:
