@@ -189,6 +189,12 @@ def test_the_sharp_image_of_a_light_holds_the_light_of_its_starburst(tmp_path):
     assert drawn.light_mask[int(light["place_px"][1]), int(light["place_px"][0])] == 1
 
 
+def test_settings_that_exclude_each_other_are_refused_in_python_too(tmp_path):
+    with pytest.raises(ProjectError, match=r'format = "exr" holds linear light'):
+        dataset(spec_of(format="exr"), tmp_path / "pairs", items=1)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_picture_without_lights_is_clean():
     spec = spec_of(lights={"count": 0}, sensor={}, layout="folder", splits={"train": 1.0})
     drawn = draw_pictures(spec, 0, ())

@@ -156,7 +156,7 @@ def dataset_from_data(data: dict[str, Any], *, folder: Path, where: str) -> Data
     )
     if spec is not None:
         problems += _text_problems(spec, folder)
-        problems += _contradictions(spec)
+        problems += [*contradictions(spec), *_idle(spec)]
     if spec is None or problems:
         raise ProjectFileError(summary(where, problems), tuple(problems))
     return _resolved(spec, folder)
@@ -190,15 +190,11 @@ def _text_problems(spec: DatasetSpec, folder: Path) -> list[str]:
     return found
 
 
-def _contradictions(spec: DatasetSpec) -> list[str]:
-    """Return the settings that exclude each other or have no effect, a sentence each."""
+def contradictions(spec: DatasetSpec) -> list[str]:
+    """Return the settings of a specification that exclude each other, a sentence each."""
     sensor, found = spec.sensor, []
-    if spec.lens.f_number is not None and "stops_down" in spec.lens.model_fields_set:
-        found.append("lens.f_number and lens.stops_down both set the aperture; keep one")
     if sensor.full_well_e is None and sensor.read_noise_e.support != (0.0, 0.0):
         found.append("sensor.read_noise_e needs sensor.full_well_e, the electrons at white")
-    if sensor.full_well_e is None and "noise" in sensor.model_fields_set:
-        found.append("sensor.noise has no effect without sensor.full_well_e; give it, or leave noise out")
     if spec.format != "exr" and not sensor.clip:
         found.append('sensor.clip = false needs format = "exr"; other files hold nothing above white')
     if spec.format == "exr" and sensor.tone.choice != ("linear",):
@@ -213,11 +209,24 @@ def _contradictions(spec: DatasetSpec) -> list[str]:
         found.append("layout flare7k has its own parts; leave parts out")
     if spec.layout == "flare7k" and spec.format not in ("png", "jpeg"):
         found.append('layout flare7k has 8-bit pictures; choose format = "png" or "jpeg"')
+    return found + _split_problems(spec)
+
+
+def _idle(spec: DatasetSpec) -> list[str]:
+    """Return the keys of a file that have no effect, a sentence each."""
+    sensor, found = spec.sensor, []
+    if spec.lens.f_number is not None and "stops_down" in spec.lens.model_fields_set:
+        found.append("lens.f_number and lens.stops_down both set the aperture; keep one")
+    if sensor.full_well_e is None and "noise" in sensor.model_fields_set:
+        found.append("sensor.noise has no effect without sensor.full_well_e; give it, or leave noise out")
     if spec.layout != "webdataset" and "items_per_shard" in spec.model_fields_set:
         found.append(f"items_per_shard has no effect in layout {spec.layout}; leave it out")
     if spec.background.folder is None and (idle := spec.background.model_fields_set - {"folder"}):
         found.append(f"background.{min(idle)} has no effect without background.folder; give it, or leave both out")
-    return found + _split_problems(spec)
+    weighed = [name for name, part in spec.splits if isinstance(part, float) and name in spec.splits.model_fields_set]
+    if any(isinstance(part, tuple) for _, part in spec.splits) and any(name != "train" for name in weighed):
+        found.append("splits has names and weights; give names in all of them, or weights in all")
+    return found
 
 
 def _split_problems(spec: DatasetSpec) -> list[str]:
@@ -230,9 +239,6 @@ def _split_problems(spec: DatasetSpec) -> list[str]:
             if other > split:
                 found += [f"splits: {name!r} is in {split} and in {other}; keep one" for name in part if name in others]
     weighed = {name: part for name, part in spec.splits if isinstance(part, float)}
-    given = [name for name in weighed if name in spec.splits.model_fields_set and weighed[name] > 0.0]
-    if named and [name for name in given if name != "train"]:
-        found.append("splits has names and weights; give names in all of them, or weights in all")
     if not named and not sum(weighed.values()) > 0.0:
         found.append("splits: all weights are 0; give one above 0")
     wanted = sum(part > 0.0 for part in weighed.values())

@@ -16,7 +16,7 @@ from ...errors import FileError, OutputError, ProjectError
 from ...io.files.atomic_write import write_atomically
 from ...io.files.tar_members import join_parts
 from ...io.files.text_file import digest_of, read_bytes, read_json
-from ...io.project.dataset_file import read_dataset_spec
+from ...io.project.dataset_file import contradictions, read_dataset_spec
 from ...io.project.named_files import picture_files
 from ...jobs.frame_list import chunk_of, parse_chunk
 from ...jobs.processes import shares, work_off
@@ -165,6 +165,9 @@ def dataset(
 def plan_of(spec: DatasetSpec | str | PathLike[str], output: str | PathLike[str]) -> DatasetPlan:
     """Return what all items share; raises an error now for lenses and backgrounds that cannot be used."""
     settings = spec if isinstance(spec, DatasetSpec) else read_dataset_spec(spec)
+    # of a record made in Python; a file's are found by its reader
+    if problems := contradictions(settings):
+        raise ProjectError(problems[0], tuple(problems))
     check_lenses(settings)
     backgrounds = list_backgrounds(settings)
     return DatasetPlan(settings, os.fspath(output), backgrounds, _digest(settings, backgrounds))
