@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     from .model import Surface as Surface
     from .model import Tabulated as Tabulated
     from .model import Timeline as Timeline
+    from .model.project.dataset import DatasetSpec as DatasetSpec
     from .render.analysis import ghosts as ghosts
     from .render.analysis import paraxial as paraxial
     from .render.render import Rendering as Rendering
@@ -100,6 +101,7 @@ _HOMES = {
     ".io.images.half": ("exr_scale",),
     ".io.project.project_file": ("read_project",),
     ".measure.replay.measured_project": ("render_measured",),
+    ".model.project.dataset": ("DatasetSpec",),
     ".render.analysis": ("ghosts", "paraxial"),
     ".render.scene.looks": ("look_of", "with_look"),
     ".render.scene.photographic_defaults": ("as_photographed",),

@@ -235,6 +235,7 @@ TRIALS = {
     "library thumbnails": Trial(
         ("library", "thumbnails"), ("state/library/thumbnails/*.jpg",),
         prepare=lambda folder: (_lenses(folder), _run(folder, ("library", "add", "lenses")), None)[-1],
+    ),
     "dataset": Trial(
         ("dataset", "pairs.toml", "-n", "24", "--processes", "2", "-o", "out"), ("out/*",),
         prepare=lambda folder: (folder / "pairs.toml").write_text(PAIRS) and None,

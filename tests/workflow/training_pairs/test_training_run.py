@@ -124,8 +124,12 @@ def test_an_interrupted_run_resumes_and_finished_items_are_kept(whole, tmp_path,
     assert (again.drawn, again.kept) == (ITEMS - 1, 1)
     assert contents(folder) == contents(whole)
     assert not (folder / ".items").exists()
+    # killed after the tar files were complete, before the parts were removed
+    (folder / ".items").mkdir()
+    part.write_bytes(b"")
     monkeypatch.setattr(item, "draw_pictures", None)
     assert dataset(spec_of(), folder, items=ITEMS, processes=1).kept == ITEMS
+    assert not (folder / ".items").exists()
 
 
 def test_a_set_grows_but_never_mixes(whole, tmp_path):

@@ -139,6 +139,9 @@ def dataset(
     if not mine:
         return _result(plan, items, [], 0, [f"chunk {chunk} of {items} items is empty"])
     packed = [unit for unit in units if settings.layout == "webdataset" and _is_packed(plan, unit)]
+    for complete in packed:
+        # of a run that was killed between the two
+        _remove_fragments(plan, complete)
     done = [ItemResult(index, _split(settings, index), False) for unit in packed for index in unit]
     ready = {one.index for one in done}
     todo = [index for index in mine if index not in ready]
@@ -298,6 +301,13 @@ def _pack(plan: DatasetPlan, unit: range) -> None:
         lines = [item_record(plan, index, split) for index in indices]
         _write_lines(_shard(plan, unit, split, "jsonl"), [line for line in lines if line is not None])
         join_parts(_shard(plan, unit, split, "tar"), [fragment(plan, index) for index in indices])
+    _remove_fragments(plan, unit)
+
+
+def _remove_fragments(plan: DatasetPlan, unit: range) -> None:
+    """Remove the items of a complete tar file, and their folder with the last ones."""
+    if not plan.staging.is_dir():
+        return
     for index in unit:
         fragment(plan, index).unlink(missing_ok=True)
     with suppress(OSError):
