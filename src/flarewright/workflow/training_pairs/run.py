@@ -230,8 +230,12 @@ def _claim(plan: DatasetPlan, items: int) -> None:
         with suppress(FileExistsError):
             try:
                 folder.mkdir()
-            except PermissionError:
-                raise OutputError(f"cannot make the folder {folder}: check the permissions of its parent") from None
+            except FileExistsError:
+                raise
+            except (OSError, ValueError) as error:
+                # a name with a zero byte is a ValueError
+                reason = (getattr(error, "strerror", None) or str(error)).lower()
+                raise OutputError(f"cannot make the folder {folder} ({reason}): choose another place") from None
     spec = plan.spec
     data = {
         "schema_version": 1, "version": __version__, "digest": plan.digest, "items": items, "layout": spec.layout,
