@@ -49,6 +49,7 @@ from .render import command as render
 from .render import ghosts_command as ghosts
 from .render import nuke_command as nuke
 from .render import shot_command as shot
+from .render import sources_command as sources
 
 # messages of older releases of Typer on option values
 _TYPES = {"is not a valid float": "is no number", "is not a valid integer": "is no whole number"}
@@ -79,6 +80,7 @@ app.command("render", epilog=render.EPILOG)(render.render)
 app.command("shot", epilog=shot.EPILOG)(shot.shot)
 app.command("nuke-script", epilog=nuke.EPILOG)(nuke.nuke_script)
 app.command("dataset", epilog=dataset.EPILOG)(dataset.dataset)
+app.command("sources", epilog=sources.EPILOG)(sources.sources)
 app.command("ghosts", epilog=ghosts.EPILOG)(ghosts.ghosts)
 app.command("predict", epilog=predict.EPILOG)(predict.predict)
 app.command("lenses", epilog=lenses.EPILOG)(lenses.lenses)

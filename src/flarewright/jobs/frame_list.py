@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -115,6 +116,42 @@ class FramePattern:
 
         path = Path(self.text)
         return path.with_name(_FIELD.sub(number, path.name))
+
+    @property
+    def stem(self) -> str:
+        """Name without the number, its separator and the suffix.
+
+        Examples
+        --------
+        >>> FramePattern("out/flare.####.exr").stem, FramePattern("a_$F2.exr").stem
+        ('flare', 'a')
+        """
+        stem = Path(_FIELD.sub("", Path(self.text).name)).stem
+        return stem.rstrip("._-") or "frames"
+
+    def on_disk(self) -> tuple[int, ...]:
+        """Return the numbers of the frames whose files exist, ascending; none for a plain name.
+
+        Raises
+        ------
+        ProjectError
+            The folder cannot be read.
+        """
+        path = Path(self.text)
+        field = _FIELD.search(path.name)
+        if field is None:
+            return ()
+        before, after = path.name[: field.start()], path.name[field.end() :]
+        name = re.compile(f"{re.escape(before)}(-?[0-9]{{1,9}}){re.escape(after)}")
+        try:
+            matches = [name.fullmatch(each) for each in os.listdir(path.parent)]
+        except OSError as error:
+            raise ProjectError(
+                f"{self.text}: the folder {path.parent} cannot be read ({(error.strerror or str(error)).lower()})"
+            ) from None
+        numbers = {int(match[1]) for match in matches if match}
+        # other files can have as many digits
+        return tuple(sorted(number for number in numbers if self.path(number).name in {m[0] for m in matches if m}))
 
     def check(self, frames: Sequence[int]) -> None:
         """Raise ProjectError if several frames would go to one file."""

@@ -16,9 +16,11 @@ from ..model import Project
 from .keyframes import frame_rate, is_still, length_s, time_of
 
 if TYPE_CHECKING:
+    from ..plates.settings import PlateSettings
+    from .plate_sources import PlateShot
     from .shot_frame import FrameResult, ShotPlan
 
-__all__ = ["ShotResult", "shot", "shot_frames"]
+__all__ = ["ShotResult", "parsed_frames", "shot", "shot_frames"]
 
 _DRAW = "flarewright.workflow.shot_frame:draw_frame"
 # remarks that are kept; each frame can have some
@@ -40,11 +42,14 @@ class ShotResult:
     remarks : tuple of str
         About the shot and its frames, each once.
     processes : int
+    plate : PlateShot or None
+        The sources of the plate, if there is one.
     """
 
     frames: tuple[FrameResult, ...]
     remarks: tuple[str, ...]
     processes: int
+    plate: PlateShot | None = None
 
 
 def shot(
@@ -61,6 +66,9 @@ def shot(
     threads: int | None = None,
     report: Callable[[FrameResult, int, int], None] | None = None,
     prepare: Callable[[Project, int], None] | None = None,
+    plate: PlateSettings | None = None,
+    over: str | os.PathLike[str] | None = None,
+    searched: Callable[[int, int, int], None] | None = None,
 ) -> ShotResult:
     """Draw frames of a project whose values change over time, and write a file for each.
 
@@ -94,6 +102,13 @@ def shot(
     prepare : callable, optional
         Called once with the first frame's project and the number of threads, before processes start: the command line
         compiles kernels here.
+    plate : PlateSettings, optional
+        A picture, or one a frame, whose bright sources are lights, in addition to those of the project (of which dark
+        ones are left out). The layers then have the unit of the plate. `frames` of None: all frames of the plate.
+    over : path, optional
+        Also write the plate with its flare, one EXR file a frame, named as `output`.
+    searched : callable, optional
+        Called after the search for sources in each plate with the frame, the number of searched frames and that of all.
 
     Returns
     -------
@@ -118,15 +133,20 @@ def shot(
 
     _check(shutter_deg, subframes)
     pattern = FramePattern(os.fspath(output))
-    numbers, remarks = shot_frames(project, frames)
+    numbers, remarks = shot_frames(project, frames, plate)
     pattern.check(numbers)
     _check_output(pattern)
-    plan = ShotPlan(project, pattern.text, shutter_deg, subframes, parts, cropped)
+    comp = _comp_pattern(over, pattern, plate, numbers)
     mine = numbers if chunk is None else chunk_of(numbers, *parse_chunk(chunk))
     if shutter_deg == 0.0 and subframes is not None and subframes > 1:
         remarks.append("sub-frames have no effect without an open shutter: give its angle, such as 180 degrees")
+    found = None if plate is None else _searched(project, plate, numbers, pattern, comp, processes, threads, searched)
+    if found is not None:
+        remarks += found.remarks
+    _check_sequences(project, mine)
+    plan = ShotPlan(project, pattern.text, shutter_deg, subframes, parts, cropped, found, comp)
     if not mine:
-        return ShotResult((), (*remarks, f"chunk {chunk} of {len(numbers)} frames is empty"), 0)
+        return ShotResult((), (*remarks, f"chunk {chunk} of {len(numbers)} frames is empty"), 0, found)
     _check_moments(plan, mine)
     number, each = shares(len(mine), processes if processes is not None else _fitting(plan, threads), threads)
     if prepare is not None:
@@ -138,10 +158,73 @@ def shot(
         if report is not None:
             report(one.result, len(done), len(mine))
     done.sort(key=lambda result: result.frame)
-    return ShotResult(tuple(done), (*remarks, *_remarks(done)), number)
+    return ShotResult(tuple(done), (*remarks, *_remarks(done)), number, found)
 
 
-def shot_frames(project: Project, frames: str | Sequence[int] | None) -> tuple[tuple[int, ...], list[str]]:
+def _comp_pattern(
+    over: str | os.PathLike[str] | None,
+    output: FramePattern,
+    plate: PlateSettings | None,
+    frames: Sequence[int],
+) -> str:
+    """Return the checked file name of the comps; empty if none is wanted."""
+    if over is None:
+        return ""
+    if plate is None:
+        raise ProjectError("a comp is laid over a plate, and there is none; give a plate, or omit --over")
+    pattern = FramePattern(os.fspath(over))
+    pattern.check(frames)
+    _check_output(pattern)
+    named = {name: FramePattern(name).path(frames[0]) for name in (output.text, plate.files)}
+    for name, path in named.items():
+        if path.resolve() == pattern.path(frames[0]).resolve():
+            raise ProjectError(f"--over {pattern.text} would replace {name}; choose another name")
+    return pattern.text
+
+
+def _searched(
+    project: Project,
+    plate: PlateSettings,
+    frames: Sequence[int],
+    output: FramePattern,
+    comp: str,
+    processes: int | None,
+    threads: int | None,
+    report: Callable[[int, int, int], None] | None,
+) -> PlateShot:
+    """Find the sources of the plate in all frames of the shot, whichever of them this process draws."""
+    from ..kernels.jit.warmup_processes import cores
+    from .plate_frame import check_comp, check_plate
+    from .plate_sources import plate_shot, sources_file
+
+    found = plate_shot(
+        plate, frames, kept=sources_file(output.text), processes=processes or threads or cores(), report=report
+    )
+    check_plate(project, found)
+    if comp:
+        check_comp(project, found)
+    return found
+
+
+def _check_sequences(project: Project, frames: Sequence[int]) -> None:
+    """Raise an error before the work if a frame of a sequence that hides lights is missing."""
+    holdouts = [project.holdout, *(light.holdout for light in project.lights)]
+    names = {name for each in holdouts if each is not None for name in (each.image, each.depth) if name is not None}
+    for pattern in map(FramePattern, sorted(names)):
+        if not pattern.numbered:
+            continue
+        there = set(pattern.on_disk())
+        missing = [frame for frame in frames if frame not in there]
+        if missing:
+            raise ProjectError(
+                f"the holdout {pattern.text} lacks frame{'s'[: len(missing) > 1]} {frames_text(missing)[:80]}; give "
+                "frames that exist"
+            )
+
+
+def shot_frames(
+    project: Project, frames: str | Sequence[int] | None, plate: PlateSettings | None = None
+) -> tuple[tuple[int, ...], list[str]]:
     """Return the numbers of a shot's frames, and remarks on them.
 
     Parameters
@@ -149,21 +232,26 @@ def shot_frames(project: Project, frames: str | Sequence[int] | None) -> tuple[t
     project : Project
     frames : str or sequence of int, optional
         As of `shot`.
+    plate : PlateSettings, optional
+        Its frames are the default, and must exist.
 
     Raises
     ------
     ProjectError
         There are none, or all of them lie outside the time in which the project moves.
     """
+    if plate is not None:
+        from .plate_sources import plate_frames
+
+        return plate_frames(plate, parsed_frames(frames), project.timeline.start), []
     timeline, long_s = project.timeline, length_s(project)
     last = timeline.start + ceil(long_s * float(frame_rate(timeline.fps)) - 1e-6)
     if frames is None:
         if is_still(project):
             raise ProjectError("nothing in the project moves, so it has no last frame; give the frames, such as 1-24")
         return tuple(range(timeline.start, last + 1)), []
-    numbers = parse_frames(frames) if isinstance(frames, str) else tuple(sorted(set(frames)))
-    if not numbers:
-        raise ProjectError("the list of frames is empty; give at least one, such as 1-24")
+    numbers = parsed_frames(frames)
+    assert numbers is not None
     if is_still(project):
         alike = "nothing in the project moves: all frames are alike"
         return numbers, [alike] if len(numbers) > 1 else []
@@ -178,6 +266,22 @@ def shot_frames(project: Project, frames: str | Sequence[int] | None) -> tuple[t
         return numbers, []
     which = f"frames {frames_text(outside)[:80]} lie" if len(outside) > 1 else f"frame {outside[0]} lies"
     return numbers, [f"{which} outside the keys, {timeline.start}-{last}: everything rests there"]
+
+
+def parsed_frames(frames: str | Sequence[int] | None) -> tuple[int, ...] | None:
+    """Return the frames of a text or a list, ascending, each once; None for None.
+
+    Raises
+    ------
+    ProjectError
+        The text is no list of frames (`jobs.frame_list.parse_frames`), or there are none.
+    """
+    if frames is None:
+        return None
+    numbers = parse_frames(frames) if isinstance(frames, str) else tuple(sorted(set(frames)))
+    if not numbers:
+        raise ProjectError("the list of frames is empty; give at least one, such as 1-24")
+    return numbers
 
 
 def _remarks(done: Sequence[FrameResult]) -> list[str]:

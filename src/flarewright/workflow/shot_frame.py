@@ -27,6 +27,8 @@ from ..render.render import render as render_project
 from ..render.scene.resolve import open_lens, resolve_project
 from .keyframes import frame_rate, peak_intensity, project_at, still, time_of
 from .motion_blur import mean_layers, subframe_count, subframe_times
+from .plate_frame import alike_lights, comp_attributes, with_frame_files, with_plate_lights, write_comp
+from .plate_sources import PlateShot
 
 __all__ = ["FrameResult", "ShotPlan", "draw_frame", "frame_project", "part_name"]
 
@@ -52,6 +54,10 @@ class ShotPlan:
         One part of the file for each layer, or one part with the channels of all.
     cropped : bool
         Single ghosts have their own data windows instead of the picture's.
+    plate : PlateShot or None
+        A plate whose sources are lights of the project.
+    over : str
+        File name of the comp of plate and flare, with a place for the frame's number; empty: none.
     """
 
     project: Project
@@ -60,6 +66,8 @@ class ShotPlan:
     subframes: int | None = None
     parts: Literal["multi", "single"] = "multi"
     cropped: bool = False
+    plate: PlateShot | None = None
+    over: str = ""
 
     def path(self, frame: int) -> Path:
         """Return the file of a frame."""
@@ -72,7 +80,12 @@ class ShotPlan:
 
     @property
     def scale(self) -> float:
-        """Factor of the irradiances in all files: that of the brightest light at any time, so that it is constant."""
+        """Factor of the irradiances in all files: that of the brightest light at any time, so that it is constant.
+
+        1 over a plate: layers have its unit, and add to it as they are.
+        """
+        if self.plate is not None:
+            return 1.0
         return 1.0 if self.project.output.pixel_type == "float" else half_scale(peak_intensity(self.project))
 
 
@@ -99,7 +112,16 @@ class FrameResult:
 
 def frame_project(plan: ShotPlan, at_s: float) -> Project:
     """Return what is drawn at a time: the project without keyframes, with the values that they have then."""
-    return still(project_at(plan.project, at_s))
+    return _moment(plan, at_s)[0]
+
+
+def _moment(plan: ShotPlan, at_s: float) -> tuple[Project, float]:
+    """Return what is drawn at a time, and the part of the plate's light where the lens images nothing."""
+    timeline = plan.project.timeline
+    # a time is a rounded number of frames
+    frame = round(timeline.start + at_s * float(frame_rate(timeline.fps)), 6)
+    project = with_frame_files(still(project_at(plan.project, at_s)), frame)
+    return (project, 0.0) if plan.plate is None else with_plate_lights(project, plan.plate, frame)
 
 
 def draw_frame(plan: ShotPlan, frame: int, threads: int | None = None) -> FrameResult:
@@ -126,12 +148,10 @@ def draw_frame(plan: ShotPlan, frame: int, threads: int | None = None) -> FrameR
     try:
         moments = _moments(plan, frame)
         digest = _digest(plan, frame, moments)
-        damaged = False
-        if path.exists():
-            made_by = _made_by(path)
-            if made_by == digest:
-                return FrameResult(frame, str(path), False, len(moments))
-            damaged = made_by is None
+        files = [path, FramePattern(plan.over).path(frame)] if plan.over else [path]
+        made_by = {file: _made_by(file) for file in files if file.exists()}
+        if all(made_by.get(file) == digest for file in files):
+            return FrameResult(frame, str(path), False, len(moments))
         rendering = _draw(moments, threads)
         _write(plan, frame, moments, rendering, digest)
     except OutputError:
@@ -139,8 +159,16 @@ def draw_frame(plan: ShotPlan, frame: int, threads: int | None = None) -> FrameR
         raise
     except FlarewrightError as error:
         raise type(error)(f"frame {frame}: {error}", error.problems) from None
-    again = (f"{path} was damaged or of another program; it was replaced",) if damaged else ()
-    return FrameResult(frame, str(path), True, len(moments), (*again, *rendering.remarks))
+    again = [f"{file} was damaged or of another program; it was replaced" for file, by in made_by.items() if by is None]
+    return FrameResult(frame, str(path), True, len(moments), (*again, *_lost(plan, frame), *rendering.remarks))
+
+
+def _lost(plan: ShotPlan, frame: int) -> tuple[str, ...]:
+    """Return a remark on sources of the plate where the lens images nothing."""
+    lost = 0.0 if plan.plate is None else _moment(plan, time_of(frame, plan.project.timeline))[1]
+    if lost <= 0.0:
+        return ()
+    return (f"{lost:.2%} of the plate's light lies where the lens images nothing, and is left out",)
 
 
 def part_name(layer: str) -> str:
@@ -167,7 +195,8 @@ def _moments(plan: ShotPlan, frame: int) -> tuple[Project, ...]:
         projects = [frame_project(plan, sample) for sample in samples]
         # brightness and colour change without motion; the samples are enough for them
         still_bright = all(project == projects[0] for project in projects)
-        number = 1 if still_bright else max(_SAMPLES, subframe_count(projects))
+        alike = projects if plan.plate is None else alike_lights(projects)
+        number = 1 if still_bright else max(_SAMPLES, subframe_count(alike))
     moments = [frame_project(plan, moment) for moment in subframe_times(at_s, plan.open_s, number)]
     if moments[0].quality.mode == "reference":
         # independent errors, which the mean reduces
@@ -189,7 +218,7 @@ def _digest(plan: ShotPlan, frame: int, moments: tuple[Project, ...]) -> str:
         opened = open_lens(lens).lens
         content = opened.model_dump_json()
         images.update(picture_files(opened))
-    made_of = {
+    made_of: dict[str, Any] = {
         "version": __version__,
         "moments": [project.model_dump(mode="json", exclude={"lens"}) for project in moments],
         "lens": content,
@@ -197,6 +226,12 @@ def _digest(plan: ShotPlan, frame: int, moments: tuple[Project, ...]) -> str:
         "frame": [frame, str(frame_rate(timeline.fps)), plan.open_s],
         "file": [plan.scale, plan.parts, plan.cropped],
     }
+    if plan.plate is not None:
+        settings = plan.plate.settings
+        made_of["comp"] = [plan.over, plan.plate.threshold, settings.highlights, settings.layer, settings.transfer]
+        named = [settings.files, *([] if settings.matte is None else [settings.matte])]
+        # a flare alone carries attributes of its plate
+        made_of["plate"] = [digest_of(FramePattern(name).path(frame)) for name in named]
     return sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()
 
 
@@ -250,7 +285,11 @@ def _write(plan: ShotPlan, frame: int, moments: tuple[Project, ...], rendering: 
         "subframes": str(len(moments)),
         "lights": json.dumps(lights),
     }
-    facts = _facts(shown)
+    attributes = shot_attributes(
+        frame=frame, fps=frame_rate(plan.project.timeline.fps), shutter_s=plan.open_s, **_facts(shown)
+    )
+    if plan.plate is not None:
+        attributes |= comp_attributes(plan.plate, frame)
     names = [part_name(layer.name) for layer in rendering.layers]
     if len(set(names)) < len(names):
         raise ProjectError(f"two layers would have one name among {', '.join(names)[:200]}")
@@ -267,10 +306,11 @@ def _write(plan: ShotPlan, frame: int, moments: tuple[Project, ...], rendering: 
             full_windows=not plan.cropped,
             one_part=plan.parts == "single",
             compression=project.output.compression,
-            attributes=shot_attributes(
-                frame=frame, fps=frame_rate(plan.project.timeline.fps), shutter_s=plan.open_s, **facts
-            ),
+            attributes=attributes,
         )
+        if plan.plate is not None and plan.over:
+            over = FramePattern(plan.over).path(frame)
+            write_comp(over, plan.plate, frame, rendering.layers, project, metadata, attributes)
 
 
 def _facts(project: Project) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Commands `flarewright render`, `flarewright shot` and `flarewright ghosts`.
+"""Commands `flarewright render`, `flarewright shot`, `flarewright sources` and `flarewright ghosts`.
 
 - `command`: `render`, and the files written
 - `options`: the options of `render`, a record for each section of the help page
@@ -12,6 +12,8 @@
 - `preview`: the PNG: options, exposure, file
 - `nuke_command`: `flarewright nuke-script`
 - `shot_command`: `shot`, the frames of a moving project
+- `plate_flags`: `plate_settings` converts the options of a plate
+- `sources_command`: `sources`, the lights found in a plate
 - `ghosts_command`: `ghosts`, the ghost analysis of a lens
 - `ghost_sweep`: its `--sweep` over fields, wavelengths and f-numbers
 """

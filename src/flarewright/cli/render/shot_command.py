@@ -7,9 +7,9 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from ...errors import ProjectError
 from ..common import first_run_bar, print_json, print_remarks, progress_bar
@@ -19,32 +19,35 @@ from .options.record import RenderOptions
 from .options.shot import ShotOptions
 
 if TYPE_CHECKING:
-    from ...jobs.frame_list import FramePattern
     from ...model import Project
+    from ...plates.settings import PlateSettings
+    from ...workflow.plate_sources import PlateShot
     from ...workflow.shot_frame import FrameResult
 
 EPILOG = (
     "Examples:\n\nflarewright shot --project drive.toml -o flare.####.exr\n\n"
     "flarewright shot --project drive.toml --frames 1001-1240 --start 1001 --fps 25 --shutter 180 -o flare.%04d.exr\n\n"
-    "flarewright shot --project drive.toml --chunk 2/5 -o flare.####.exr"
+    "flarewright shot --project drive.toml --chunk 2/5 -o flare.####.exr\n\n"
+    "flarewright shot plate.####.exr --lens canon-28-80 --fstop 4 -o flare.####.exr --over comp.####.exr"
 )
 
 
 @with_options(ShotOptions)
 def shot(options: ShotOptions) -> None:
-    """Draw the frames of a project whose light, lens or camera moves, one EXR each.
+    """Draw the frames of a moving flare, or the flare of the lights in a plate, one EXR each.
 
     Finished frames are kept: the same command resumes, and a changed project draws only the frames that it changes.
     On a terminal a bar shows the progress; elsewhere stderr gets one line of JSON for each frame.
     """
-    from ...jobs.frame_list import FramePattern
     from ...workflow.shot import shot as draw
+    from .plate_flags import plate_settings
 
     parts = _parts(options.parts)
-    project, remarks = _project(options)
-    keep_inputs(project, options.project, _files(FramePattern(options.output), project, options.frames))
+    plate = plate_settings(options.plate, options)
+    project, remarks = _project(options, plate)
+    _keep_inputs(options, project, plate)
     started = time.monotonic()
-    with _progress() as report:
+    with _progress() as (report, searched):
         result = draw(
             project,
             options.output,
@@ -58,6 +61,9 @@ def shot(options: ShotOptions) -> None:
             threads=options.threads,
             report=report,
             prepare=_compile,
+            plate=plate,
+            over=options.over,
+            searched=searched,
         )
     remarks = [*remarks, *result.remarks]
     print_remarks(remarks)
@@ -76,6 +82,7 @@ def shot(options: ShotOptions) -> None:
                 "seconds": round(seconds, 3),
                 "fps": project.timeline.fps,
                 "start": project.timeline.start,
+                **({} if result.plate is None else {"plate": _plate_data(result.plate)}),
                 "remarks": remarks,
             }
         )
@@ -95,21 +102,95 @@ def _parts(text: str | None) -> Literal["multi", "single"]:
     raise ProjectError(f"--parts {text!r} is unknown; choose multi or single")
 
 
-def _project(options: ShotOptions) -> tuple[Project, list[str]]:
+def _project(options: ShotOptions, plate: PlateSettings | None) -> tuple[Project, list[str]]:
     """Return the project of the options, with their timeline, and remarks."""
+    from .project_flags import project_of
+
+    found: list[str] = []
+    if plate is not None:
+        options, found = _over_plate(options, plate)
+    options, sequences = _sequences(options)
     names = {each.name for each in fields(RenderOptions)} & {each.name for each in fields(ShotOptions)}
     # a render's shutter exposes its PNG
     same = {name: getattr(options, name) for name in names - {"output", "shutter"}}
     timeline = {key: value for key, value in (("fps", options.fps), ("start", options.start)) if value is not None}
     _, project, remarks = project_of_options(RenderOptions(**same, output=Path(options.output)), None, timeline)
-    return project, remarks
+    if sequences:
+        kept = dict(project.holdout) if project.holdout is not None else {}
+        project = project_of({**dict(project), "holdout": {**kept, "image": None, "depth": None, **sequences}})
+    return project, [*found, *remarks]
 
 
-def _files(pattern: FramePattern, project: Project, frames: str | None) -> list[Path]:
-    """Return the files of all frames."""
-    from ...workflow.shot import shot_frames
+def _sequences(options: ShotOptions) -> tuple[ShotOptions, dict[str, str]]:
+    """Return the options without sequences of holdouts, and those sequences; a render knows only single files."""
+    from ...jobs.frame_list import FramePattern
 
-    return [pattern.path(frame) for frame in shot_frames(project, frames)[0]]
+    if options.holdout is not None and options.depth is not None:
+        raise ProjectError("--holdout and --depth both hide lights; give one of them")
+    found: dict[str, str] = {}
+    if options.holdout is not None and FramePattern(str(options.holdout)).numbered:
+        found["image"] = str(options.holdout)
+        options = replace(options, holdout=None)
+    if options.depth is not None and FramePattern(str(options.depth)).numbered:
+        found["depth"] = str(options.depth)
+        options = replace(options, depth=None)
+    return options, found
+
+
+def _over_plate(options: ShotOptions, plate: PlateSettings) -> tuple[ShotOptions, list[str]]:
+    """Return the options with what a plate states: its size and its rate; and remarks."""
+    from ...workflow.plate_sources import plate_frames, plate_picture
+    from ...workflow.shot import parsed_frames
+
+    first = plate_picture(plate, plate_frames(plate, parsed_frames(options.frames), options.start or 1)[0])
+    width, height = first.size_px
+    remarks = []
+    placed = options.light or options.light_px or options.sun or options.track
+    if not placed and options.project is None:
+        for flag in ("intensity", "spectrum", "distance", "light_diameter", "light_size", "light_polygon"):
+            if getattr(options, flag):
+                words = "--plate-gain changes the lights of the plate"
+                raise ProjectError(f"--{flag.replace('_', '-')} is for a --light, and none is given; {words}")
+        # dark, and left out beside the plate's lights; its size keeps photographic defaults from giving it one
+        options = replace(options, light=["0,0"], intensity=[0.0], light_diameter=[0.0])
+    if options.size is None and options.project is None:
+        options = replace(options, size=f"{width}x{height}")
+    if options.fps is None and options.project is None and first.fps is not None:
+        options = replace(options, fps=float(first.fps))
+    if abs(first.pixel_aspect / (options.squeeze or 1.0) - 1.0) > 0.01 and not options.desqueeze:
+        remarks.append(
+            f"the plate states pixels {first.pixel_aspect:g} times as wide as high; --squeeze {first.pixel_aspect:g} "
+            "gives the flare such pixels"
+        )
+    return options, remarks
+
+
+def _keep_inputs(options: ShotOptions, project: Project, plate: PlateSettings | None) -> None:
+    """Raise an error if a frame would replace an input file."""
+    from ...jobs.frame_list import FramePattern
+    from ...workflow.shot import parsed_frames, shot_frames
+
+    frames = shot_frames(project, parsed_frames(options.frames), plate)[0]
+    outputs = [FramePattern(name).path(frame) for name in (options.output, options.over) if name for frame in frames]
+    keep_inputs(project, options.project, outputs)
+    if plate is None:
+        return
+    read = [FramePattern(name) for name in (plate.files, plate.matte) if name is not None]
+    inputs = {pattern.path(frame).resolve() for pattern in read for frame in frames}
+    for output in outputs:
+        if output.resolve() in inputs:
+            raise ProjectError(f"{output} would replace a frame of the plate; choose another name")
+
+
+def _plate_data(plate: PlateShot) -> dict[str, Any]:
+    """Return what the search in a plate found, as JSON data."""
+    return {
+        "threshold": plate.threshold,
+        "size_px": list(plate.size_px),
+        "sources": list(plate.found),
+        "lights": len(plate.lights.tracks),
+        "area_lights": int(plate.lights.extended.sum()),
+    }
 
 
 def _compile(project: Project, threads: int) -> None:
@@ -121,13 +202,26 @@ def _compile(project: Project, threads: int) -> None:
         compile_for_render(project, threads, lambda sentence: print_remarks([sentence]), first_run_bar)
 
 
+_Report = Callable[["FrameResult", int, int], None]
+_Searched = Callable[[int, int, int], None]
+
+
 @contextmanager
-def _progress() -> Iterator[Callable[[FrameResult, int, int], None]]:
+def _progress() -> Iterator[tuple[_Report, _Searched]]:
     """Show a bar on a terminal; elsewhere print one JSON object per frame to stderr."""
     if sys.stderr.isatty():
         with progress_bar() as begin:
-            bar = begin("shot")
-            yield lambda result, done, of: bar(done / of, f"frame {result.frame}, {done} of {of}")
+            bars: dict[str, Any] = {}
+
+            def show(what: str, done: int, of: int, words: str) -> None:
+                if what not in bars:
+                    bars[what] = begin(what)
+                bars[what](done / of, words)
+
+            yield (
+                lambda result, done, of: show("shot", done, of, f"frame {result.frame}, {done} of {of}"),
+                lambda frame, done, of: show("finding lights", done, of, f"frame {frame}, {done} of {of}"),
+            )
         return
     started = time.monotonic()
     # the first frame also waits for kernels and processes, and kept ones take no time: neither predicts the others
@@ -146,4 +240,12 @@ def _progress() -> Iterator[Callable[[FrameResult, int, int], None]]:
         }  # fmt: skip
         print(json.dumps(data), file=sys.stderr, flush=True)
 
-    yield line
+    def search_line(frame: int, done: int, of: int) -> None:
+        nonlocal started
+        data = {"frame": frame, "state": "searched", "done": done, "of": of}
+        print(json.dumps(data), file=sys.stderr, flush=True)
+        if done == of:
+            # the estimate is that of the drawing
+            started = time.monotonic()
+
+    yield line, search_line

@@ -9,6 +9,7 @@
 - `mask_image`: `read_mask`, iris and dirt images; `read_grey`
 - `photo`: `open_photo`, photographs with linear values (RAW, TIFF, EXR, NPY); `photo_facts`, their EXIF tags
 - `picture`: `read_picture`, any colour picture as linear RGB; `decode_srgb`
+- `plate_picture`: `read_plate`, photographs and rendered pictures in which lights are found
 - `plate_image`: `read_matte` and `read_depth`, holdouts
 - `png`: `write_png`, `encode_png`, `png_address`
 - `sample_png`: `encode_samples`, PNG files of 8 or 16 bits for training data

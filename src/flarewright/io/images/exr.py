@@ -384,12 +384,61 @@ def read_exr_colour(path: str | PathLike[str], what: str = "an EXR file") -> Pix
     FileError
         When it is not a readable EXR file, or has none of these channels.
     """
+    return read_exr_layer(path, None, what)[0]
+
+
+def read_exr_layer(
+    path: str | PathLike[str], layer: str | None, what: str = "an EXR file"
+) -> tuple[Pixels, dict[str, Any]]:
+    """Read the colours of a layer of any EXR file within its display window.
+
+    Parameters
+    ----------
+    path : path
+    layer : str or None
+        A part's name, or the beginning of the names of its channels: "diffuse" for diffuse.R, diffuse.G, diffuse.B.
+        None: plain channels R, G and B, or a single channel, or Y (grey).
+    what : str
+        Expected kind of file, for messages.
+
+    Returns
+    -------
+    pixels : ndarray, shape (H, W, 3), float32
+        0 outside the data window, and for values that are infinite or NaN.
+    header : dict
+        Attributes of the layer's part, over those of the first part.
+
+    Raises
+    ------
+    FileError
+        When it is not a readable EXR file, or has no such layer.
+    """
     with sentences_for(path, what, "give an EXR file"):
-        part, names = _part_with(_open_parts(path, what), (("R", "G", "B"), ("Y",)))
+        file = _open_parts(path, what)
+        part, names = _layer(file, layer, path)
         values = [np.asarray(part.channels[name].pixels, dtype=np.float64) / _scale(part) for name in names]
         planes = [_over_display(part, plane) for plane in values]
-        colours = np.stack(planes if len(planes) == 3 else [planes[0]] * 3, axis=-1).astype(np.float32)
-        return np.where(np.isfinite(colours), colours, np.float32(0.0))
+        colours = np.stack(planes if len(planes) == 3 else [planes[0]] * 3, axis=-1)
+        largest = float(np.finfo(np.float32).max)
+        pixels = np.where(np.abs(colours) <= largest, colours, 0.0).astype(np.float32)
+        return pixels, {**file.parts[0].header, **part.header}
+
+
+def _layer(file: Any, layer: str | None, path: str | PathLike[str]) -> tuple[Any, Sequence[str]]:
+    """Return the part and the channels of a layer; of the plain colours if none is named."""
+    if layer is None:
+        return _part_with(file, (("R", "G", "B"), ("Y",)))
+    for prefix in (f"{layer}.", ""):
+        for part in file.parts:
+            names = [f"{prefix}{channel}" for channel in _CHANNELS]
+            if (prefix or part.name() == layer) and all(name in part.channels for name in names):
+                return part, names
+    channels = {name.rpartition(".")[0] for part in file.parts for name in part.channels if name.endswith(".R")}
+    known = sorted(channels | {part.name() for part in file.parts if "R" in part.channels and part.name()})
+    raise FileError(
+        f"{shown(path)} has no layer {layer!r} with R, G and B: its layers are {', '.join(known[:12]) or 'unnamed'}; "
+        "choose one, or omit the name"
+    )
 
 
 def _plane(part: Any, names: Sequence[str]) -> Floats:

@@ -2,6 +2,7 @@
 
 - `light`: the lights, and what hides them
 - `place`: lights in pixels, tracks, the sun
+- `plate`: a plate, and which areas of it are lights
 - `lens`: the lens: aperture, iris, coating, scatter, zoom, filters
 - `camera`: the sensor and the picture
 - `quality`: how the picture is computed

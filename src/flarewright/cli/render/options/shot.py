@@ -14,6 +14,7 @@ from .layers import PANEL, LayerOptions
 from .lens import LensOptions
 from .light import LightOptions
 from .place import PlaceOptions
+from .plate import CompOptions, PlateFile, PlateOptions
 from .quality import QualityOptions
 from .starburst import StarburstOptions
 
@@ -108,8 +109,11 @@ class ShotOptions(
     LensOptions,
     PlaceOptions,
     LightOptions,
+    CompOptions,
+    PlateOptions,
     ShotOutput,
     ShotInputs,
+    PlateFile,
 ):
     """The options as given; the last base comes first on the help page."""
 

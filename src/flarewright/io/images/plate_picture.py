@@ -1,0 +1,201 @@
+"""Read a plate: a photograph or a rendered picture of a scene, with linear values and what its file states."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from ...errors import FileError, optional
+from ...model.project.camera import Colorspace
+from ...typing import Pixels
+from ..files.door import outside, shown
+from .exr import CHROMATICITIES, read_exr_layer
+from .picture import SCREEN, decode_srgb
+
+__all__ = ["PLATE_SUFFIXES", "PlatePicture", "Transfer", "read_plate"]
+
+Transfer = Literal["srgb", "linear"]
+"""What the codes of a file mean: display codes of sRGB, or linear values."""
+
+_TIFF = (".tif", ".tiff")
+PLATE_SUFFIXES = (".exr", *_TIFF, *SCREEN)
+"""Kinds of files that a plate can be."""
+
+# largest difference of chromaticity coordinates of the same primaries; files round them differently
+_SAME_PRIMARIES = 2e-3
+
+
+@dataclass(frozen=True)
+class PlatePicture:
+    """A plate, read.
+
+    Attributes
+    ----------
+    pixels : ndarray, shape (H, W, 3), float32
+        Linear values, row 0 at the top.
+    white : float or None
+        Value at which the file clips; None for floating-point numbers, which do not clip.
+    transfer : {"srgb", "linear"}
+        How its codes were read.
+    colorspace : {"rec709", "acescg"} or None
+        Primaries that the file states; None if it states none, or others.
+    pixel_aspect : float
+    fps : Fraction or None
+    header : dict
+        Attributes of an EXR file that stay with the picture: timeCode, framesPerSecond and the camera's.
+    remarks : tuple of str
+    """
+
+    pixels: Pixels
+    white: float | None
+    transfer: Transfer
+    colorspace: Colorspace | None = None
+    pixel_aspect: float = 1.0
+    fps: Fraction | None = None
+    header: dict[str, Any] | None = None
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height."""
+        return self.pixels.shape[1], self.pixels.shape[0]
+
+
+# attributes of OpenEXR's standard list that describe the photograph, not the file
+_KEPT = (
+    "timeCode", "framesPerSecond", "keyCode", "owner", "capDate", "utcOffset", "isoSpeed", "expTime", "reelName",
+    "cameraMake", "cameraModel", "cameraSerialNumber", "imageCounter",
+)  # fmt: skip
+
+
+def read_plate(
+    path: str | os.PathLike[str], *, layer: str | None = None, transfer: Transfer | None = None
+) -> PlatePicture:
+    """Read a plate.
+
+    Parameters
+    ----------
+    path : path
+        EXR (half, float or integer; any layer; within its display window), or TIFF, PNG, JPEG, WebP with 8 bits; TIFF
+        also with 16 bits or floating-point numbers (extra `photo`).
+    layer : str, optional
+        Layer of an EXR file; None: its plain colours.
+    transfer : {"srgb", "linear"}, optional
+        None: srgb for whole numbers, linear for floating-point numbers.
+
+    Returns
+    -------
+    PlatePicture
+
+    Raises
+    ------
+    FileError
+        The file is missing, damaged, too large, of another kind, or has no such layer.
+
+    Examples
+    --------
+    >>> plate = read_plate("drive.1001.exr", layer="beauty")                    # doctest: +SKIP
+    >>> plate.size_px                                                           # doctest: +SKIP
+    (1920, 1080)
+    """
+    place = Path(path)
+    suffix = place.suffix.lower()
+    if suffix == ".exr":
+        return _exr(place, layer, transfer)
+    if layer is not None:
+        raise FileError(f"{shown(place)} has no layers, so there is no {layer!r}: omit the layer, or give an EXR file")
+    if suffix in _TIFF:
+        return _tiff(place, transfer)
+    if suffix in SCREEN:
+        return _screen(place, transfer)
+    raise FileError(f"{shown(place)} is no plate: give EXR, TIFF, PNG, JPEG or WebP; develop a RAW file first")
+
+
+def _exr(path: Path, layer: str | None, transfer: Transfer | None) -> PlatePicture:
+    pixels, header = read_exr_layer(path, layer, "a plate")
+    kept = {name: header[name] for name in _KEPT if name in header}
+    space, remarks = _primaries(header)
+    if transfer == "srgb":
+        pixels = decode_srgb(np.clip(pixels, 0.0, 1.0))
+    return PlatePicture(
+        pixels,
+        1.0 if transfer == "srgb" else None,
+        transfer or "linear",
+        space,
+        float(header.get("pixelAspectRatio", 1.0)),
+        _rate(header.get("framesPerSecond")),
+        kept,
+        remarks,
+    )
+
+
+def _primaries(header: dict[str, Any]) -> tuple[Colorspace | None, tuple[str, ...]]:
+    """Return the colour space that the attribute chromaticities states."""
+    stated = header.get("chromaticities")
+    if stated is None:
+        return None, ()
+    given = np.asarray(stated, dtype=np.float64).ravel()
+    for space, known in CHROMATICITIES.items():
+        if given.shape == (8,) and np.abs(given - known).max() < _SAME_PRIMARIES:
+            return space, ()
+    return None, ("the plate states primaries that are neither Rec.709 nor ACEScg; they are read as Rec.709",)
+
+
+def _rate(stated: Any) -> Fraction | None:
+    """Return frames per second from OpenEXR's rational number."""
+    if stated is None:
+        return None
+    try:
+        rate = Fraction(stated)
+    except (TypeError, ValueError, ZeroDivisionError):
+        return None
+    return rate if 0 < rate <= 1000 else None
+
+
+def _screen(path: Path, transfer: Transfer | None) -> PlatePicture:
+    from PIL import Image
+
+    with outside(path, "a plate", pixel_bytes=16, remedy="give PNG, JPEG or EXR") as file, Image.open(file) as image:
+        deep = image.mode.startswith("I") or (image.format == "PNG" and _depth(image) > 8)
+        coded = np.asarray(image.convert("RGB"), dtype=np.float32) / np.float32(255.0)
+    remarks = ("the plate has 16 bits, of which a PNG's first 8 are read; give TIFF or EXR for all",) if deep else ()
+    return _decoded(coded, transfer, remarks)
+
+
+def _depth(image: Any) -> int:
+    """Return the bits a channel of an open PNG; Pillow converts 16 bits of colours to 8 without a word."""
+    mode = image.tile[0].args if image.tile else ""
+    mode = mode[0] if isinstance(mode, tuple) else mode
+    return 16 if "16" in str(mode) else 8
+
+
+def _tiff(path: Path, transfer: Transfer | None) -> PlatePicture:
+    tifffile = optional("tifffile", "photo", f"reading {shown(path)}")
+    with outside(path, "a plate", pixel_bytes=16, remedy="save it as EXR or 16-bit TIFF"):
+        values = np.asarray(tifffile.imread(path, key=0))
+        if values.ndim == 3 and values.shape[0] in (3, 4) and values.shape[2] not in (3, 4):
+            values = np.moveaxis(values, 0, 2)
+        if values.ndim == 2:
+            values = np.repeat(values[..., None], 3, axis=2)
+        if values.ndim != 3 or values.shape[2] not in (3, 4) or values.dtype.kind not in "uf":
+            raise ValueError(f"it holds {values.dtype} {values.shape}, no picture")
+    values = values[..., :3]
+    if values.dtype.kind == "u":
+        return _decoded((values / np.float32(np.iinfo(values.dtype).max)).astype(np.float32), transfer, ())
+    pixels = np.where(np.isfinite(values), values, 0.0).astype(np.float32)
+    if transfer == "srgb":
+        return _decoded(np.clip(pixels, 0.0, 1.0), transfer, ())
+    return PlatePicture(pixels, None, "linear")
+
+
+def _decoded(coded: Pixels, transfer: Transfer | None, remarks: tuple[str, ...]) -> PlatePicture:
+    """Return a plate of codes from 0 to 1."""
+    kind: Transfer = transfer or "srgb"
+    if transfer is None:
+        remarks = (*remarks, "the plate has display codes, decoded from sRGB; --plate-transfer linear reads them as is")
+    return PlatePicture(decode_srgb(coded) if kind == "srgb" else coded, 1.0, kind, "rec709", remarks=remarks)

@@ -1,0 +1,241 @@
+"""Lights of the renderer from the sources of a plate.
+
+A plate value L is the radiance of the scene, in units of the plate. A source of such values over a solid angle is a
+light of irradiance L omega. The lens images the radiance L of the axis as an irradiance L / f, where f is the factor
+4 N^2 / (pi T) (`plate_factor`): lights of intensity L omega f give layers in units of the plate, which add to it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import degrees, pi
+
+import numpy as np
+
+from ..model import Light, Rgb
+from ..model.project.light import LEAST_LIGHT_DEG, Rectangle
+from ..render.scene.direct_image import direct_image
+from ..render.scene.pixel_place import direct_images
+from ..render.scene.resolve import ResolvedProject
+from ..typing import Floats, Mask
+from .detection import LUMINANCE
+from .field_map import FieldMap
+from .settings import SUNLIT_LX, SourceKind
+from .tracking import Tracks
+
+__all__ = ["PlateTracks", "lights_at", "plate_factor", "plate_tracks"]
+
+# sources narrower than this are points, pixels of the plate
+_POINT_PX = 3.0
+# largest ratio of the axes of a disc
+_ROUND = 1.3
+# widest light, degrees, below that of the model
+_WIDEST_DEG, _WIDEST_DISC_DEG = 110.0, 60.0
+
+
+@dataclass(frozen=True)
+class PlateTracks:
+    """The lights of a plate over time, in its pixels.
+
+    Attributes
+    ----------
+    tracks : Tracks
+        Steady and joined.
+    extended : ndarray of bool, shape (T,)
+        Area lights; the others are points.
+    round : ndarray of bool, shape (T,)
+        Area lights that are discs; the others are rectangles.
+    size_px : tuple of int
+        Width and height of the plate.
+    known : SourceKind or None
+        A lamp of known brightness.
+    white : float or None
+        Plate value of white paper in the sun.
+    named : ndarray, shape (T, F)
+        Part of its largest light that each source of known brightness shows; NaN for sources measured in the plate.
+    gain : float
+    """
+
+    tracks: Tracks
+    extended: Mask
+    round: Mask
+    size_px: tuple[int, int]
+    known: SourceKind | None
+    white: float | None
+    named: Floats
+    gain: float = 1.0
+
+
+def plate_tracks(
+    tracks: Tracks,
+    size_px: tuple[int, int],
+    *,
+    gain: float = 1.0,
+    known: SourceKind | None = None,
+    white: float | None = None,
+    clips_at: float | None = None,
+    joined: int = 0,
+) -> PlateTracks:
+    """Decide for a whole sequence which sources are points and which have a known brightness.
+
+    Parameters
+    ----------
+    tracks : Tracks
+    size_px : tuple of int
+    gain : float
+    known : SourceKind, optional
+        The brightest source is the sun; or every clipped source, or else the brightest, is such a lamp.
+    white : float, optional
+        Plate value of white paper in the sun.
+    clips_at : float, optional
+        Luminance from which a source counts as clipped.
+    joined : int
+        The last tracks, which are no single lamps.
+
+    Returns
+    -------
+    PlateTracks
+    """
+    bright = tracks.light @ LUMINANCE
+    with np.errstate(invalid="ignore"):
+        xx, xy, yy = np.moveaxis(tracks.moments_px2, -1, 0)
+        middle, apart = 0.5 * (xx + yy), 0.5 * np.sqrt((xx - yy) ** 2 + 4.0 * xy**2)
+    wide = _mean(np.sqrt(12.0 * (middle + apart)), bright)
+    narrow = _mean(np.sqrt(12.0 * np.maximum(middle - apart, 0.0)), bright)
+    named = np.full(bright.shape, np.nan)
+    if known is not None and len(tracks):
+        chosen = np.zeros(len(tracks), dtype=np.bool_)
+        if known.kind == "lamp" and clips_at is not None:
+            chosen = tracks.peak.max(axis=1) >= clips_at
+        chosen[len(tracks) - joined :] = False
+        if not chosen.any():
+            chosen[int(np.argmax(bright.max(axis=1)))] = True
+        named[chosen] = bright[chosen] / np.maximum(bright[chosen].max(axis=1, keepdims=True), 1e-300)
+    is_round = wide < _ROUND * narrow
+    return PlateTracks(tracks, wide > _POINT_PX, is_round, size_px, known, white, named, gain)
+
+
+def _mean(values: Floats, weights: Floats) -> Floats:
+    """Return the mean of each row by its weights; a value that is NaN has none."""
+    return np.asarray((np.nan_to_num(values) * weights).sum(axis=1) / np.maximum(weights.sum(axis=1), 1e-300))
+
+
+def plate_factor(settled: ResolvedProject, directions: FieldMap) -> float:
+    """Return the plate value of an irradiance on the sensor: radiance of the scene per irradiance of its image.
+
+    Parameters
+    ----------
+    settled : ResolvedProject
+    directions : FieldMap
+
+    Returns
+    -------
+    float
+        4 N^2 / (pi T) on the axis for green light; T is the transmittance of the lens.
+
+    Notes
+    -----
+    A light of irradiance E has a direct image of flux E A, with the throughput A of `render.scene.direct_image`. A
+    pixel of solid angle omega and area a gets the irradiance L omega A / a (physics.md, Radiometry).
+    """
+    images = direct_images(settled, Light(field_deg=(0.0, 0.0)))
+    throughput = direct_image(images.lens, images.shot).throughput_mm2
+    column, row, across, down = images.shot.to_pixels
+    omega = float(directions.solid_angles(np.array([[column, row]]))[0])
+    return float(1.0 / (omega * across * down * throughput[(len(throughput) - 1) // 2]))
+
+
+def lights_at(plate: PlateTracks, frame: float, directions: FieldMap, factor: float, size_px: tuple[int, int]) -> tuple[
+    tuple[Light, ...], float
+]:  # fmt: skip
+    """Return the lights of a plate at a frame.
+
+    Parameters
+    ----------
+    plate : PlateTracks
+    frame : float
+        Number; between frames, values are interpolated.
+    directions : FieldMap
+    factor : float
+        `plate_factor`.
+    size_px : tuple of int
+        Of the camera's picture, which shows what the plate shows, larger or smaller.
+
+    Returns
+    -------
+    lights : tuple of Light
+        One dark light if there is none.
+    lost : float
+        Part of the light where the lens images nothing.
+    """
+    centre, light, moments, named = _between(plate, frame)
+    there = light.sum(axis=1) > 0.0
+    scale = np.array(size_px) / plate.size_px
+    places = np.where(there[:, None], centre, 0.5 * np.array(plate.size_px)) * scale
+    slopes, change = directions.slopes(places), directions.jacobians(places)
+    # solid angles of the plate's pixels
+    omega = directions.solid_angles(places) * float(np.prod(scale))
+    seen = np.isfinite(slopes).all(axis=1) & np.isfinite(omega)
+    total = float((light[there] @ LUMINANCE).sum())
+    found = []
+    for k in np.flatnonzero(there & seen):
+        rgb = light[k] * omega[k] * factor * plate.gain
+        if np.isfinite(named[k]):
+            assert plate.known is not None
+            assert plate.white is not None
+            # white paper that faces an illuminance E has the luminance E / pi
+            irradiance = pi * plate.white * plate.known.illuminance_lx / SUNLIT_LX
+            rgb = rgb / (rgb @ LUMINANCE) * irradiance * named[k] * factor * plate.gain
+        intensity = float(rgb @ LUMINANCE)
+        if not intensity > 0.0:
+            continue
+        field = np.degrees(np.arctan(slopes[k]))
+        shape, diameter = None, 0.0
+        if plate.extended[k] and plate.round[k]:
+            xx, _, yy = moments[k]
+            # a disc of radius r has the moments r^2 / 4; its area is that of the pixels
+            diameter = 4.0 * degrees((0.5 * (xx + yy) * omega[k]) ** 0.5)
+        elif plate.extended[k]:
+            # pixels of the plate to degrees, along the field angles X and Y
+            per_px = np.degrees(change[k] / (1.0 + slopes[k][:, None] ** 2)) * scale
+            shape = _rectangle(per_px, moments[k])
+        found.append(
+            Light(
+                name=f"plate-{k + 1}",
+                field_deg=(float(field[0]), float(field[1])),
+                intensity=intensity,
+                spectrum=Rgb(rgb=tuple(float(value) for value in rgb / rgb.max())),
+                diameter_deg=0.0 if diameter < LEAST_LIGHT_DEG else min(diameter, _WIDEST_DISC_DEG),
+                shape=shape,
+            )
+        )
+    lost = float((light[there & ~seen] @ LUMINANCE).sum()) / total if total > 0.0 else 0.0
+    return tuple(found) or (Light(name="plate", field_deg=(0.0, 0.0), intensity=0.0),), lost
+
+
+def _between(plate: PlateTracks, frame: float) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return centres, sums, moments and parts of known brightness at a frame, between two frames if it lies there."""
+    tracks = plate.tracks
+    frames = tracks.frames
+    high = int(np.clip(np.searchsorted(frames, frame), 0, len(frames) - 1))
+    low = high if frames[high] <= frame else max(high - 1, 0)
+    part = 0.0 if high == low else float((frame - frames[low]) / (frames[high] - frames[low]))
+
+    def mix(values: Floats) -> Floats:
+        a, b = values[:, low], values[:, high]
+        # a source that is absent in one of both frames stays at its place
+        a, b = np.where(np.isnan(a), b, a), np.where(np.isnan(b), a, b)
+        return a + part * (b - a)
+
+    light = tracks.light[:, low] + part * (tracks.light[:, high] - tracks.light[:, low])
+    return mix(tracks.centre_px), light, mix(tracks.moments_px2), mix(plate.named)
+
+
+def _rectangle(per_px: Floats, moments: Floats) -> Rectangle:
+    """Return the uniform rectangle with second moments, which are given in pixels."""
+    xx, xy, yy = moments
+    spread = per_px @ np.array([[xx, xy], [xy, yy]]) @ per_px.T
+    values, axes = np.linalg.eigh(spread)
+    sides = np.clip(np.sqrt(12.0 * np.maximum(values, 0.0)), LEAST_LIGHT_DEG, _WIDEST_DEG)
+    angle = degrees(np.arctan2(axes[1, 1], axes[0, 1]))
+    return Rectangle(size_deg=(float(sides[1]), float(sides[0])), rotation_deg=float(angle))

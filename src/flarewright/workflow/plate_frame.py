@@ -1,0 +1,200 @@
+"""A frame of a shot over a plate: its lights from the plate, its files from sequences, and its comp."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+from ..errors import ProjectError
+from ..io.images.exr import write_exr
+from ..jobs.frame_list import FramePattern
+from ..measure.replay.measured_project import is_measured
+from ..model import Art, Dirt, Layer, Light, Output, Project, Quality, Starburst
+from ..plates.comp import composed, source_mask
+from ..plates.field_map import FieldMap, field_map
+from ..plates.lights import lights_at, plate_factor
+from ..plates.measured_plate import converted, measured_pixels
+from ..render.scene.resolve import resolve_project
+from .plate_sources import PlateShot, plate_matte, plate_picture
+
+__all__ = [
+    "alike_lights",
+    "check_comp",
+    "check_plate",
+    "comp_attributes",
+    "with_frame_files",
+    "with_plate_lights",
+    "write_comp",
+]
+
+# passes that a comp adds; the beauty is their sum
+_BEAUTY = "beauty"
+# relative difference of the shapes of plate and picture
+_SHAPE_TOLERANCE = 0.01
+
+
+def with_frame_files(project: Project, frame: float) -> Project:
+    """Return a project with the files of a frame instead of names with a place for its number.
+
+    Parameters
+    ----------
+    project : Project
+        Its holdouts, and those of its lights, can be sequences.
+    frame : float
+        Number; between two frames, the nearest one's files.
+    """
+    changes: dict[str, Any] = {}
+    number = round(frame)
+    if project.holdout is not None:
+        changes["holdout"] = _numbered(project.holdout, number)
+    if any(light.holdout is not None for light in project.lights):
+        changes["lights"] = tuple(
+            light if light.holdout is None else light.replace(holdout=_numbered(light.holdout, number))
+            for light in project.lights
+        )
+    found: Project = project.replace(**changes) if changes else project
+    return found
+
+
+def _numbered(holdout: Any, frame: int) -> Any:
+    files = {
+        key: str(FramePattern(name).path(frame))
+        for key in ("image", "depth")
+        if (name := getattr(holdout, key)) is not None and FramePattern(name).numbered
+    }
+    return holdout.replace(**files) if files else holdout
+
+
+def with_plate_lights(project: Project, plate: PlateShot, frame: float) -> tuple[Project, float]:
+    """Return a project with the lights of a plate.
+
+    Parameters
+    ----------
+    project : Project
+        At the moment of the frame. Its own lights stay; dark ones are removed.
+    plate : PlateShot
+    frame : float
+        Number, or a place between two frames.
+
+    Returns
+    -------
+    project : Project
+    lost : float
+        Part of the plate's light at places where the lens images nothing.
+
+    Raises
+    ------
+    ProjectError
+        The project is a measured flare, whose lens is unknown.
+    """
+    directions, factor = _optics(project)
+    lights, lost = lights_at(plate.lights, frame, directions, factor, project.camera.size_px)
+    own = tuple(light for light in project.lights if light.intensity > 0.0)
+    if own:
+        lights = tuple(light for light in lights if light.intensity > 0.0)
+    found: Project = project.replace(lights=own + lights)
+    return found, lost
+
+
+def _optics(project: Project) -> tuple[FieldMap, float]:
+    """Return the directions of the picture's places, and the plate's factor; both once for the same lens."""
+    if is_measured(project):
+        raise ProjectError(
+            f"{project.lens} is a measured flare, whose lens is unknown, so places in a plate have no angles; give a "
+            "lens"
+        )
+    # what neither bends nor dims the direct image
+    bare = project.replace(
+        lights=(Light(field_deg=(0.0, 0.0)),), holdout=None, art=Art(), dirt=Dirt(), starburst=Starburst(),
+        output=Output(), design=None, curves=(),
+        quality=Quality(mode="final", wavelengths=project.quality.wavelengths),
+    )  # fmt: skip
+    return _optics_of(bare.model_dump_json())
+
+
+@lru_cache(maxsize=64)
+def _optics_of(text: str) -> tuple[FieldMap, float]:
+    settled = resolve_project(Project.model_validate_json(text))
+    directions = field_map(settled)
+    return directions, plate_factor(settled, directions)
+
+
+def alike_lights(projects: Sequence[Project]) -> list[Project]:
+    """Return projects with the lights that all of them have, by name, so that their motion can be compared."""
+    names = set.intersection(*({light.name for light in project.lights} for project in projects))
+    found = []
+    for project in projects:
+        lights = tuple(light for light in project.lights if light.name in names)
+        found.append(project.replace(lights=lights) if lights else project)
+    return found
+
+
+def check_plate(project: Project, plate: PlateShot) -> None:
+    """Raise ProjectError if a project's picture has another shape than the plate."""
+    (width, height), (wide, high) = project.camera.size_px, plate.size_px
+    # whole pixels on both sides
+    if abs(wide * height / (width * high) - 1.0) > _SHAPE_TOLERANCE + 1.0 / min(width, height):
+        raise ProjectError(
+            f"the plate is {wide}x{high} and the picture {width}x{height}, of another shape; omit --size, or give one "
+            "of the plate's shape"
+        )
+
+
+def check_comp(project: Project, plate: PlateShot) -> None:
+    """Raise ProjectError if a project's passes cannot be laid over the plate."""
+    if project.camera.size_px != plate.size_px:
+        raise ProjectError(
+            f"the comp needs the size of the plate, {plate.size_px[0]}x{plate.size_px[1]}, not "
+            f"{project.camera.size_px[0]}x{project.camera.size_px[1]}; omit --size or --over"
+        )
+    if project.output.layers == "beauty":
+        raise ProjectError("the comp needs the passes, for the plate shows the lights already; omit --layers beauty")
+
+
+def comp_attributes(plate: PlateShot, frame: int) -> dict[str, Any]:
+    """Return the attributes of a frame's plate that its flare and its comp carry on, such as timeCode."""
+    return dict(plate_picture(plate.settings, frame).header or {})
+
+
+def write_comp(
+    path: Any, plate: PlateShot, frame: int, layers: Sequence[Layer], project: Project, metadata: dict[str, str],
+    attributes: dict[str, Any],
+) -> None:  # fmt: skip
+    """Write the plate with its flare, in the values of the plate.
+
+    Parameters
+    ----------
+    path : path
+    plate : PlateShot
+    frame : int
+    layers : sequence of Layer
+        All layers of the frame's rendering.
+    project : Project
+    metadata, attributes
+        As of `write_exr`.
+
+    Raises
+    ------
+    FlarewrightError
+        The plate cannot be read, or the file cannot be written.
+    """
+    picture = plate_picture(plate.settings, frame)
+    matte = plate_matte(plate.settings, frame, plate.size_px)
+    mask = source_mask(measured_pixels(picture, plate.settings.highlights), plate.threshold, matte)
+    passes = [layer for layer in layers if layer.name != _BEAUTY and not layer.name.startswith("ghost.")]
+    passes = [layer for layer in passes if not layer.name.endswith(".variance")]
+    whole = composed(converted(picture, project.output.colorspace), passes, mask)
+    write_exr(
+        path,
+        [whole],
+        plate.size_px,
+        pixel_type=project.output.pixel_type,
+        scale=1.0,
+        metadata={**metadata, "plate": json.dumps({"threshold": plate.threshold, "gain": plate.settings.gain})},
+        pixel_aspect=project.camera.pixel_aspect,
+        colorspace=project.output.colorspace,
+        compression=project.output.compression,
+        attributes={**attributes, **(picture.header or {})},
+    )

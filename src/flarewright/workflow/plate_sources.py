@@ -1,0 +1,393 @@
+"""The sources of all frames of a plate: searched once for a whole shot, kept in a file beside its frames.
+
+Which sources count depends on the frames before and after. So every process and every chunk of a shot uses the sources
+of the whole list of frames, and finds the same ones.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+
+from .._version import __version__
+from ..errors import FileError, FlarewrightError, ProjectError
+from ..io.files.atomic_write import write_atomically
+from ..io.files.door import outside_arrays
+from ..io.files.text_file import digest_of
+from ..io.images.plate_image import read_matte
+from ..io.images.plate_picture import PlatePicture, read_plate
+from ..jobs.frame_list import FramePattern, frames_text
+from ..jobs.processes import shares, work_off
+from ..plates.detection import LUMINANCE, Sources, find_sources, mean_luminance
+from ..plates.joining import joined
+from ..plates.lights import PlateTracks, plate_tracks
+from ..plates.measured_plate import measured_pixels
+from ..plates.settings import PlateSettings
+from ..plates.tracking import TrackingSettings, follow, steady
+from ..typing import Floats, Pixels
+
+__all__ = ["PlateShot", "plate_frames", "plate_picture", "plate_shot", "sources_file", "sources_of_frame"]
+
+# frames whose mean sets a threshold in stops
+_MEAN_FRAMES = 24
+# part of the clipping value that a threshold in stops stays below
+_BELOW_WHITE = 0.9
+# sources of one frame; more are noise
+_MOST_SOURCES = 20_000
+# seconds between two writes of the partial result
+_SAVE_S = 10.0
+_FIND = "flarewright.workflow.plate_sources:sources_of_frame"
+
+
+@dataclass(frozen=True)
+class PlateShot:
+    """What a shot knows about its plate.
+
+    Attributes
+    ----------
+    settings : PlateSettings
+    threshold : float
+        Luminance above which pixels belong to sources.
+    size_px : tuple of int
+    pixel_aspect : float
+    fps : Fraction or None
+        As the plate states it.
+    lights : PlateTracks
+    found : tuple of int
+        Number of sources in each frame.
+    remarks : tuple of str
+    """
+
+    settings: PlateSettings
+    threshold: float
+    size_px: tuple[int, int]
+    pixel_aspect: float
+    fps: Fraction | None
+    lights: PlateTracks
+    found: tuple[int, ...]
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Search:
+    """What the search in each frame shares."""
+
+    settings: PlateSettings
+    threshold: float
+    size_px: tuple[int, int]
+
+
+def plate_frames(settings: PlateSettings, frames: Sequence[int] | None, start: int) -> tuple[int, ...]:
+    """Return the frames of a plate.
+
+    Parameters
+    ----------
+    settings : PlateSettings
+    frames : sequence of int, optional
+        Wanted ones; None: all files that there are.
+    start : int
+        Number of the frame of a single picture.
+
+    Returns
+    -------
+    tuple of int
+
+    Raises
+    ------
+    ProjectError
+        A frame is missing; the sentence names the first ones.
+    """
+    pattern = FramePattern(settings.files)
+    if not pattern.numbered:
+        if not Path(settings.files).is_file():
+            raise ProjectError(f"the plate {settings.files} does not exist; check the path and the spelling")
+        return (start,) if frames is None else tuple(frames)
+    found = pattern.on_disk()
+    if not found:
+        raise ProjectError(
+            f"no file is named {settings.files}; check the folder, and the number of digits (#### or %04d)"
+        )
+    wanted = tuple(range(found[0], found[-1] + 1)) if frames is None else tuple(frames)
+    _check_all_there(pattern, wanted, "the plate", found)
+    if settings.matte is not None:
+        _check_all_there(FramePattern(settings.matte), wanted, "the matte")
+    return wanted
+
+
+def _check_all_there(
+    pattern: FramePattern, frames: Sequence[int], what: str, found: Sequence[int] | None = None
+) -> None:
+    """Raise ProjectError with the missing frames of a sequence."""
+    have = set(pattern.on_disk() if found is None else found) if pattern.numbered else None
+    if have is None and not Path(pattern.text).is_file():
+        raise ProjectError(f"{what} {pattern.text} does not exist; check the path and the spelling")
+    missing = [] if have is None else [frame for frame in frames if frame not in have]
+    if missing:
+        there = f"there are {frames_text(sorted(have))[:80]}" if have else "there is none"
+        raise ProjectError(
+            f"{what} {pattern.text} lacks frame{'s'[: len(missing) > 1]} {frames_text(missing)[:80]}; {there}: give "
+            "--frames that exist"
+        )
+
+
+def plate_picture(settings: PlateSettings, frame: int) -> PlatePicture:
+    """Read the plate of a frame.
+
+    Raises
+    ------
+    FileError
+        It cannot be read.
+    """
+    return read_plate(FramePattern(settings.files).path(frame), layer=settings.layer, transfer=settings.transfer)
+
+
+def plate_matte(settings: PlateSettings, frame: int, size_px: tuple[int, int]) -> Pixels | None:
+    """Read the matte of a frame; raises ProjectError if its size differs from the plate's."""
+    if settings.matte is None:
+        return None
+    path = FramePattern(settings.matte).path(frame)
+    matte = read_matte(path)
+    if matte.shape != size_px[::-1]:
+        raise ProjectError(
+            f"{path}: the matte is {matte.shape[1]}x{matte.shape[0]} and the plate {size_px[0]}x{size_px[1]}; give a "
+            "matte of the plate's size"
+        )
+    return matte
+
+
+def sources_of_frame(search: _Search, frame: int, threads: int | None = None) -> tuple[Floats, int]:
+    """Find the sources of one frame.
+
+    Parameters
+    ----------
+    search : _Search
+    frame : int
+    threads : int, optional
+        Not used: the search has one thread.
+
+    Returns
+    -------
+    table : ndarray, shape (N, 10)
+        `Sources.table`.
+    frame : int
+
+    Raises
+    ------
+    FlarewrightError
+        The plate or its matte cannot be read, has another size, or has too many sources.
+    """
+    del threads
+    plate = plate_picture(search.settings, frame)
+    if plate.size_px != search.size_px:
+        raise ProjectError(
+            f"{FramePattern(search.settings.files).path(frame)} has {plate.size_px[0]}x{plate.size_px[1]} pixels, the "
+            f"first frame {search.size_px[0]}x{search.size_px[1]}; give frames of one size"
+        )
+    found = find_sources(
+        measured_pixels(plate, search.settings.highlights),
+        search.threshold,
+        matte=plate_matte(search.settings, frame, search.size_px),
+        least_px=search.settings.least_px,
+    )
+    if len(found) > _MOST_SOURCES:
+        raise ProjectError(
+            f"frame {frame} of the plate has more than {_MOST_SOURCES} sources above {search.threshold:.3g}; raise "
+            "the threshold, or leave small ones out (--least-pixels 4)"
+        )
+    return found.table, frame
+
+
+def sources_file(output: str) -> Path:
+    """Return the file beside the frames of a shot that keeps the sources of its plate.
+
+    Examples
+    --------
+    >>> sources_file("out/flare.####.exr").as_posix(), sources_file("flare.exr").as_posix()
+    ('out/flare.sources.npz', 'flare.sources.npz')
+    """
+    path = Path(output)
+    return path.with_name(f"{FramePattern(path.name).stem}.sources.npz")
+
+
+def plate_shot(
+    settings: PlateSettings,
+    frames: Sequence[int],
+    *,
+    kept: Path | None = None,
+    processes: int = 1,
+    report: Callable[[int, int, int], None] | None = None,
+) -> PlateShot:
+    """Find and follow the sources of a plate.
+
+    Parameters
+    ----------
+    settings : PlateSettings
+    frames : sequence of int
+        All frames of the shot, ascending.
+    kept : Path, optional
+        File with the sources of finished frames; a repeated call searches only those whose plate has changed.
+    processes : int
+    report : callable, optional
+        Called with the frame, the number of searched frames and the number of all.
+
+    Returns
+    -------
+    PlateShot
+
+    Raises
+    ------
+    FlarewrightError
+        The plates cannot be read, differ in size, or have no source at all.
+    """
+    first = plate_picture(settings, frames[0])
+    still = not FramePattern(settings.files).numbered and (
+        settings.matte is None or not FramePattern(settings.matte).numbered
+    )
+    threshold, remarks = _threshold(settings, frames[:1] if still else frames, first)
+    search = _Search(settings, threshold, first.size_px)
+    # one picture for all frames is searched once
+    searched = _searched(search, frames[:1] if still else frames, kept, processes, report)
+    found = [Sources.from_table(searched[frames[0] if still else frame]) for frame in frames]
+    if not any(len(each) for each in found):
+        raise ProjectError(
+            f"the plate has no source above {threshold:.3g}; lower --threshold or --stops"
+            + (", or check the matte" if settings.matte else "")
+        )
+    dark = [frame for frame, each in zip(frames, found, strict=True) if not len(each)]
+    if dark:
+        remarks.append(f"no source in frame{'s'[: len(dark) > 1]} {frames_text(dark)[:80]}")
+    # a still needs no memory of what came before
+    tracks = follow(
+        frames[:1] if still else frames,
+        found[:1] if still else found,
+        first.size_px[0],
+        TrackingSettings(longest_gap=settings.fade),
+    )
+    tracks = steady(tracks, threshold, settings.knee_stops, 0 if still else settings.fade)
+    limited, joined_sources, groups = joined(tracks, settings.most_lights)
+    if joined_sources:
+        share = 1.0 - (limited.light[: len(limited) - groups] @ LUMINANCE).sum() / (tracks.light @ LUMINANCE).sum()
+        remarks.append(
+            f"{joined_sources} of {len(tracks)} sources, with {share:.1%} of the light, are joined to {groups} area "
+            "lights; --most-lights allows more"
+        )
+    if settings.highlights is not None and first.white is None:
+        remarks.append("--highlights has no effect on a plate of floating-point numbers, which does not clip")
+    clips_at = None
+    if first.white is not None:
+        clips_at = _BELOW_WHITE * (settings.highlights or 1.0)
+    lights = plate_tracks(
+        limited, first.size_px, gain=settings.gain, known=settings.source, white=settings.white, clips_at=clips_at,
+        joined=groups,
+    )  # fmt: skip
+    return PlateShot(
+        settings, threshold, first.size_px, first.pixel_aspect, first.fps, lights, tuple(len(each) for each in found),
+        (*first.remarks, *remarks),
+    )  # fmt: skip
+
+
+def _threshold(settings: PlateSettings, frames: Sequence[int], first: PlatePicture) -> tuple[float, list[str]]:
+    """Return the threshold of all frames, and a remark on it."""
+    if settings.threshold is not None:
+        return settings.threshold, []
+    step = max(1, -(-len(frames) // _MEAN_FRAMES))
+    pictures = [first, *(plate_picture(settings, frame) for frame in frames[step::step])]
+    mean = float(np.mean([mean_luminance(measured_pixels(plate, settings.highlights)) for plate in pictures]))
+    if mean <= 0.0:
+        raise ProjectError("the plate is black, so a threshold in stops above its mean is none; give --threshold")
+    found = mean * 2.0**settings.stops
+    words = f"sources are brighter than {found:.3g}, {settings.stops:g} stops above the plate's mean of {mean:.3g}"
+    if first.white is not None and found > _BELOW_WHITE * (settings.highlights or 1.0):
+        found = _BELOW_WHITE * (settings.highlights or 1.0)
+        words = (
+            f"sources are brighter than {found:.3g}, near the plate's white, for {settings.stops:g} stops above its "
+            f"mean of {mean:.3g} lie beyond"
+        )
+    return found, [f"{words}; --threshold sets another value"]
+
+
+def _searched(
+    search: _Search,
+    frames: Sequence[int],
+    kept: Path | None,
+    processes: int,
+    report: Callable[[int, int, int], None] | None,
+) -> dict[int, Floats]:
+    """Return the sources of each frame, those in the file `kept` or new ones."""
+    made_of = {frame: _made_of(search, frame) for frame in frames}
+    known = {} if kept is None else _read(kept)
+    found = {frame: known[digest] for frame, digest in made_of.items() if digest in known}
+    todo = [frame for frame in frames if frame not in found]
+    number, each = shares(len(todo), processes)
+    saved = time.monotonic()
+    for one in work_off(_FIND, search, todo, processes=number, threads=each, what="frame"):
+        table, frame = one.result
+        found[frame] = table
+        if report is not None:
+            report(frame, len(found), len(frames))
+        if kept is not None and time.monotonic() - saved > _SAVE_S:
+            _write(kept, {made_of[frame]: table for frame, table in found.items()})
+            saved = time.monotonic()
+    if kept is not None and todo:
+        _write(kept, {made_of[frame]: found[frame] for frame in frames})
+    return found
+
+
+def _made_of(search: _Search, frame: int) -> str:
+    """Return a digest of what determines the sources of a frame."""
+    settings = asdict(search.settings)
+    for later in ("stops", "knee_stops", "fade", "most_lights", "gain", "white", "source", "threshold", "files"):
+        del settings[later]
+    plate = digest_of(FramePattern(search.settings.files).path(frame))
+    matte = None if search.settings.matte is None else digest_of(FramePattern(search.settings.matte).path(frame))
+    del settings["matte"]
+    parts = (__version__, repr(sorted(settings.items())), repr(search.threshold), repr(search.size_px), plate, matte)
+    return sha256(repr(parts).encode()).hexdigest()
+
+
+def _read(path: Path) -> dict[str, Floats]:
+    """Return the kept sources by their digests; none if the file is damaged or of another program."""
+    if not path.exists():
+        return {}
+    try:
+        with outside_arrays(path, "the sources of a plate", "delete it") as arrays:
+            names, counts, tables = arrays["made_of"], arrays["counts"], arrays["sources"]
+    except (FileError, KeyError):
+        return {}
+    whole = (
+        names.ndim == counts.ndim == 1
+        and len(names) == len(counts)
+        and counts.dtype.kind == "i"
+        and names.dtype.kind == "U"
+        and tables.ndim == 2
+        and tables.shape == (counts.sum(), 10)
+        and tables.dtype == np.float64
+        and (counts >= 0).all()
+        and np.isfinite(tables).all()
+    )
+    if not whole:
+        return {}
+    return dict(zip((str(name) for name in names), np.split(tables, np.cumsum(counts)[:-1]), strict=True))
+
+
+def _write(path: Path, found: dict[str, Floats]) -> None:
+    """Write the sources; a file of another program is not replaced."""
+    if path.exists() and not _read(path):
+        raise FlarewrightError(f"{path} is no file of sources of a plate; move it, or choose another name for -o")
+    tables = list(found.values())
+
+    def write(temporary: Path) -> None:
+        np.savez(
+            temporary,
+            made_of=np.array(list(found), dtype="U64"),
+            counts=np.array([len(table) for table in tables], dtype=np.int64),
+            sources=np.concatenate(tables) if tables else np.zeros((0, 10)),
+        )
+
+    write_atomically(path, write)
