@@ -19,6 +19,10 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 """Luminance of linear Rec.709 (ITU-R BT.709-6, item 3.2)."""
 
 
+# places at which a change of colour is searched
+_CUTS = 8
+
+
 @dataclass(frozen=True)
 class DetectionSettings:
     """How areas are described.
@@ -228,18 +232,37 @@ def _split(places: Floats, light: Floats, bright: Floats, settings: DetectionSet
         return [everything]
     along = (places - centre) @ axes[:, 1]
     kurtosis = float(bright @ along**4) * float(bright.sum()) / float(bright @ along**2) ** 2
-    first = along < 0.0
-    halves = [light[side].sum(axis=0) for side in (first, ~first)]
-    fractions = [half / half.sum() for half in halves]
-    other_colour = np.abs(fractions[0] - fractions[1]).max() > settings.colour_step
+    cut, difference = _colour_cut(along, light)
     sparse = len(places) < settings.least_fill * short * long
-    if not (sparse or kurtosis < settings.least_kurtosis or other_colour):
+    if difference > settings.colour_step:
+        first = along < cut
+    elif sparse or kurtosis < settings.least_kurtosis:
+        first = along < 0.0
+    else:
         return [everything]
     found = []
     for side in (np.flatnonzero(first), np.flatnonzero(~first)):
         parts = _split(places[side], light[side], bright[side], settings, deep - 1)
         found += [side[part] for part in parts]
     return found
+
+
+def _colour_cut(along: Floats, light: Floats) -> tuple[float, float]:
+    """Return where an area changes its colour most along its axis, and the difference of both sides in a channel."""
+    best, cut, difference = 0.0, 0.0, 0.0
+    low, high = float(along.min()), float(along.max())
+    whole = light.sum(axis=0)
+    for at in low + (high - low) * np.arange(1, _CUTS) / _CUTS:
+        one = light[along < at].sum(axis=0)
+        other = whole - one
+        if min(one.sum(), other.sum()) <= 0.0:
+            continue
+        apart = float(np.abs(one / one.sum() - other / other.sum()).max())
+        # a few pixels of another colour at an end are no part
+        score = apart * float(one.sum() * other.sum()) ** 0.5
+        if score > best:
+            best, cut, difference = score, float(at), apart
+    return cut, difference
 
 
 def _moments(places: Floats, weights: Floats) -> tuple[Floats, tuple[float, float, float]]:

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline, RectBivariateSpline
 
 from ..errors import ProjectError
 from ..model import Light
-from ..render.scene.pixel_place import DirectImages, direct_images, field_angles_at
+from ..render.scene.pixel_place import DirectImages, direct_images, field_angles_at, image_px
 from ..render.scene.resolve import ResolvedProject
 from ..typing import Floats
 
@@ -23,6 +23,9 @@ __all__ = ["FieldMap", "field_map"]
 
 # traced places along the radius, and along each side of the picture
 _RADII, _SIDE = 21, 9
+_LEAST_RADII = 4
+# largest angle from the axis, radians, and halvings until the last angle that a lens images is known
+_STEEPEST, _HALVINGS = 1.56, 14
 # places beyond the corner and the border, pixels of the camera: an area light may reach out of the picture
 _BEYOND = 1.02
 # step of the derivative, pixels
@@ -102,26 +105,20 @@ def _radial(images: DirectImages) -> Callable[[Floats], Floats]:
     column, row, across, down = images.shot.to_pixels
     width, height = images.shot.size_px
     corner = _BEYOND * float(np.hypot(0.5 * width / across, 0.5 * height / down))
-    radii, angles = [0.0], [0.0]
-    for radius in np.linspace(0.0, corner, _RADII)[1:]:
-        theta = _angle_at(images, (column + radius * across, row), angles[-1])
-        if theta is None:
-            # the last place that the lens images, to a hundredth of the step
-            low, high = radii[-1], float(radius)
-            for _ in range(7):
-                middle = 0.5 * (low + high)
-                between = _angle_at(images, (column + middle * across, row), angles[-1])
-                low, high = (low, middle) if between is None else (middle, high)
-                if between is not None:
-                    radii.append(middle)
-                    angles.append(between)
-            break
-        radii.append(float(radius))
-        angles.append(theta)
-    if len(radii) < 3:
+    last = _last_angle(images, corner * across)
+    # traced forwards, so that no tolerance of an inverse roughens the solid angles
+    angles = np.linspace(0.0, last, _RADII)
+    radii = np.zeros(_RADII)
+    for k, angle in enumerate(angles[1:], 1):
+        place = image_px(images, (float(np.degrees(angle)), 0.0))
+        radii[k] = np.nan if place is None else (place[0] - column) / across
+    known = np.isfinite(radii)
+    # a lens that folds its image has no inverse beyond the fold
+    known &= np.concatenate([[True], np.cumprod(np.diff(np.where(known, radii, -1.0)) > 0.0).astype(np.bool_)])
+    if known.sum() < _LEAST_RADII:
         raise ProjectError(f"{images.lens.name} images too little of the picture for a plate; check --sensor")
     # an odd function, so that its slope is continuous on the axis
-    at, value = np.array(radii), np.array(angles)
+    at, value = radii[known], angles[known]
     spline = CubicSpline(np.concatenate([-at[:0:-1], at]), np.concatenate([-value[:0:-1], value]))
 
     def angles_of(places_px: Floats) -> Floats:
@@ -135,13 +132,18 @@ def _radial(images: DirectImages) -> Callable[[Floats], Floats]:
     return angles_of
 
 
-def _angle_at(images: DirectImages, place_px: tuple[float, float], near: float) -> float | None:
-    """Return the angle from the axis of a place to its right, radians; None if the lens images nothing there."""
+def _last_angle(images: DirectImages, radius_px: float) -> float:
+    """Return the angle from the axis of a place to the right of it, radians, or the last angle that the lens images."""
+    column, row = images.shot.to_pixels[:2]
     try:
-        x, _ = field_angles_at(images, place_px, (float(np.degrees(near)), 0.0))
+        return float(np.radians(field_angles_at(images, (float(column + radius_px), float(row)))[0]))
     except ProjectError:
-        return None
-    return float(np.radians(x))
+        low, high = 0.0, _STEEPEST
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            lit = image_px(images, (float(np.degrees(middle)), 0.0)) is not None
+            low, high = (middle, high) if lit else (low, middle)
+        return low
 
 
 def _over_grid(images: DirectImages) -> Callable[[Floats], Floats]:
@@ -152,6 +154,7 @@ def _over_grid(images: DirectImages) -> Callable[[Floats], Floats]:
         reach = 0.5 * side * _BEYOND
         sides.append(0.5 * side + np.linspace(-reach, reach, _SIDE))
     traced = np.full((_SIDE, _SIDE, 2), np.nan)
+    per_radian = images.shot.to_pixels[2:] * [1.0, -1.0] * images.squeezed
     # from the middle outwards: each place starts at a neighbour that is known
     order = sorted(np.ndindex(_SIDE, _SIDE), key=lambda at: max(abs(at[0] - _SIDE // 2), abs(at[1] - _SIDE // 2)))
     for i, j in order:
@@ -162,9 +165,13 @@ def _over_grid(images: DirectImages) -> Callable[[Floats], Floats]:
             x, y = field_angles_at(images, (float(sides[0][i]), float(sides[1][j])), start)
         except ProjectError:
             continue
+        there = image_px(images, (x, y))
+        assert there is not None, "an inverse is traced"
         slope = np.tan(np.radians([x, y]))
         size = float(np.hypot(*slope))
         traced[i, j] = slope * (np.arctan(size) / size if size > 0.0 else 1.0)
+        # the miss of the inverse, paraxially
+        traced[i, j] += (np.array([sides[0][i], sides[1][j]]) - there) / per_radian
     known = np.isfinite(traced[..., 0])
     if known.sum() < 16:
         raise ProjectError(f"{images.lens.name} images too little of the picture for a plate; check --sensor")

@@ -1,7 +1,7 @@
-"""Limit the lights of a frame: the brightest sources stay, the others are joined to a few area lights.
+"""Limit the lights of a frame: the brightest sources stay, the others are joined to a few.
 
 A joined light has the sum, the centroid and the moments of its sources, so all light is kept. Which sources are joined
-is decided for the whole sequence: no light changes its group between frames.
+is decided for the whole sequence: no source changes its group between frames.
 """
 
 from __future__ import annotations

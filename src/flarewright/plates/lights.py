@@ -25,8 +25,8 @@ from .tracking import Tracks
 
 __all__ = ["PlateTracks", "lights_at", "plate_factor", "plate_tracks"]
 
-# sources narrower than this are points, pixels of the plate
-_POINT_PX = 3.0
+# sources narrower than these are points: part of the plate's width, pixels
+_POINT_PART, _POINT_PX = 0.005, 3.0
 # largest ratio of the axes of a disc
 _ROUND = 1.3
 # widest light, degrees, below that of the model
@@ -47,6 +47,8 @@ class PlateTracks:
         Area lights that are discs; the others are rectangles.
     size_px : tuple of int
         Width and height of the plate.
+    joined : int
+        The last tracks, each of many sources. They have ghosts only: at their centroid there is no lamp.
     known : SourceKind or None
         A lamp of known brightness.
     white : float or None
@@ -60,6 +62,7 @@ class PlateTracks:
     extended: Mask
     round: Mask
     size_px: tuple[int, int]
+    joined: int
     known: SourceKind | None
     white: float | None
     named: Floats
@@ -70,6 +73,7 @@ def plate_tracks(
     tracks: Tracks,
     size_px: tuple[int, int],
     *,
+    point_px: float | None = None,
     gain: float = 1.0,
     known: SourceKind | None = None,
     white: float | None = None,
@@ -82,6 +86,8 @@ def plate_tracks(
     ----------
     tracks : Tracks
     size_px : tuple of int
+    point_px : float, optional
+        Sources narrower than this are points; None: half a percent of the width, at least 3 pixels.
     gain : float
     known : SourceKind, optional
         The brightest source is the sun; or every clipped source, or else the brightest, is such a lamp.
@@ -112,7 +118,11 @@ def plate_tracks(
             chosen[int(np.argmax(bright.max(axis=1)))] = True
         named[chosen] = bright[chosen] / np.maximum(bright[chosen].max(axis=1, keepdims=True), 1e-300)
     is_round = wide < _ROUND * narrow
-    return PlateTracks(tracks, wide > _POINT_PX, is_round, size_px, known, white, named, gain)
+    narrowest = max(_POINT_PART * size_px[0], _POINT_PX) if point_px is None else point_px
+    extended = wide > narrowest
+    # the ghosts of lamps far from each other are no spread ghost of one
+    extended[len(tracks) - joined :] = False
+    return PlateTracks(tracks, extended, is_round, size_px, joined, known, white, named, gain)
 
 
 def _mean(values: Floats, weights: Floats) -> Floats:
@@ -207,6 +217,7 @@ def lights_at(plate: PlateTracks, frame: float, directions: FieldMap, factor: fl
                 spectrum=Rgb(rgb=tuple(float(value) for value in rgb / rgb.max())),
                 diameter_deg=0.0 if diameter < LEAST_LIGHT_DEG else min(diameter, _WIDEST_DISC_DEG),
                 shape=shape,
+                starburst=bool(k < len(there) - plate.joined),
             )
         )
     lost = float((light[there & ~seen] @ LUMINANCE).sum()) / total if total > 0.0 else 0.0

@@ -53,7 +53,10 @@ class PlateSettings:
     least_px : int
         Sources of fewer pixels are left out.
     most_lights : int
-        Largest number of lights in a frame; the faintest sources are joined to area lights.
+        Largest number of lights in a frame; the faintest sources are joined, and have ghosts only.
+    point_px : float or None
+        Sources narrower than this are points, pixels; None: half a percent of the plate's width, at least 3. An area
+        light blurs its ghosts, and costs more time.
     gain : float
         Factor of the brightness of all found lights.
     highlights : float or None
@@ -73,7 +76,8 @@ class PlateSettings:
     knee_stops: float = 1.0
     fade: int = 4
     least_px: int = 1
-    most_lights: int = 32
+    most_lights: int = 48
+    point_px: float | None = None
     gain: float = 1.0
     highlights: float | None = None
     white: float | None = None
@@ -90,12 +94,14 @@ class PlateSettings:
             raise ProjectError(f"sources of at least {self.least_px} pixels do not exist; give 1 or more")
         if not 1 <= self.most_lights <= 5000:
             raise ProjectError(f"{self.most_lights} lights are not possible; give 1 to 5000")
+        if self.point_px is not None and not self.point_px >= 0.0:
+            raise ProjectError(f"points of {self.point_px:g} pixels do not exist; give 0 or more")
         if not 0.0 < self.gain <= 1e9:
             raise ProjectError(f"a gain of the plate of {self.gain:g} is none; give a factor above 0")
         if self.highlights is not None and not 1.0 <= self.highlights <= 1e6:
             raise ProjectError(f"highlights up to {self.highlights:g} are not possible; give 1 to 1000000")
         if self.white is not None and not 0.0 < self.white < float("inf"):
-            raise ProjectError(f"white paper in the sun has a plate value above 0, not {self.white:g}")
+            raise ProjectError(f"white paper in the sun has no plate value of {self.white:g}; give one above 0")
         if self.source is not None and self.white is None:
             raise ProjectError(
                 "the brightness of a source needs the scale of the plate: give --white, the plate value of white "

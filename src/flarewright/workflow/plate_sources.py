@@ -104,27 +104,24 @@ def plate_frames(settings: PlateSettings, frames: Sequence[int] | None, start: i
         A frame is missing; the sentence names the first ones.
     """
     pattern = FramePattern(settings.files)
-    if not pattern.numbered:
-        if not Path(settings.files).is_file():
-            raise ProjectError(f"the plate {settings.files} does not exist; check the path and the spelling")
-        return (start,) if frames is None else tuple(frames)
-    found = pattern.on_disk()
-    if not found:
-        raise ProjectError(
-            f"no file is named {settings.files}; check the folder, and the number of digits (#### or %04d)"
-        )
-    wanted = tuple(range(found[0], found[-1] + 1)) if frames is None else tuple(frames)
-    _check_all_there(pattern, wanted, "the plate", found)
+    if pattern.numbered:
+        found = pattern.on_disk()
+        if not found:
+            raise ProjectError(
+                f"no file is named {settings.files}; check the folder, and the number of digits (#### or %04d)"
+            )
+        wanted = tuple(range(found[0], found[-1] + 1)) if frames is None else tuple(frames)
+    else:
+        wanted = (start,) if frames is None else tuple(frames)
+    _check_all_there(pattern, wanted, "the plate")
     if settings.matte is not None:
         _check_all_there(FramePattern(settings.matte), wanted, "the matte")
     return wanted
 
 
-def _check_all_there(
-    pattern: FramePattern, frames: Sequence[int], what: str, found: Sequence[int] | None = None
-) -> None:
+def _check_all_there(pattern: FramePattern, frames: Sequence[int], what: str) -> None:
     """Raise ProjectError with the missing frames of a sequence."""
-    have = set(pattern.on_disk() if found is None else found) if pattern.numbered else None
+    have = set(pattern.on_disk()) if pattern.numbered else None
     if have is None and not Path(pattern.text).is_file():
         raise ProjectError(f"{what} {pattern.text} does not exist; check the path and the spelling")
     missing = [] if have is None else [frame for frame in frames if frame not in have]
@@ -274,8 +271,8 @@ def plate_shot(
     if joined_sources:
         share = 1.0 - (limited.light[: len(limited) - groups] @ LUMINANCE).sum() / (tracks.light @ LUMINANCE).sum()
         remarks.append(
-            f"{joined_sources} of {len(tracks)} sources, with {share:.1%} of the light, are joined to {groups} area "
-            "lights; --most-lights allows more"
+            f"{joined_sources} of {len(tracks)} sources, with {share:.1%} of the light, are joined to {groups} lights "
+            "that have ghosts only; --most-lights allows more"
         )
     if settings.highlights is not None and first.white is None:
         remarks.append("--highlights has no effect on a plate of floating-point numbers, which does not clip")
@@ -283,8 +280,8 @@ def plate_shot(
     if first.white is not None:
         clips_at = _BELOW_WHITE * (settings.highlights or 1.0)
     lights = plate_tracks(
-        limited, first.size_px, gain=settings.gain, known=settings.source, white=settings.white, clips_at=clips_at,
-        joined=groups,
+        limited, first.size_px, point_px=settings.point_px, gain=settings.gain, known=settings.source,
+        white=settings.white, clips_at=clips_at, joined=groups,
     )  # fmt: skip
     return PlateShot(
         settings, threshold, first.size_px, first.pixel_aspect, first.fps, lights, tuple(len(each) for each in found),
@@ -342,7 +339,18 @@ def _searched(
 def _made_of(search: _Search, frame: int) -> str:
     """Return a digest of what determines the sources of a frame."""
     settings = asdict(search.settings)
-    for later in ("stops", "knee_stops", "fade", "most_lights", "gain", "white", "source", "threshold", "files"):
+    for later in (
+        "stops",
+        "knee_stops",
+        "fade",
+        "most_lights",
+        "point_px",
+        "gain",
+        "white",
+        "source",
+        "threshold",
+        "files",
+    ):
         del settings[later]
     plate = digest_of(FramePattern(search.settings.files).path(frame))
     matte = None if search.settings.matte is None else digest_of(FramePattern(search.settings.matte).path(frame))

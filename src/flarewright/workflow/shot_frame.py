@@ -228,7 +228,13 @@ def _digest(plan: ShotPlan, frame: int, moments: tuple[Project, ...]) -> str:
     }
     if plan.plate is not None:
         settings = plan.plate.settings
-        made_of["comp"] = [plan.over, plan.plate.threshold, settings.highlights, settings.layer, settings.transfer]
+        made_of["comp"] = [
+            bool(plan.over),
+            plan.plate.threshold,
+            settings.highlights,
+            settings.layer,
+            settings.transfer,
+        ]
         named = [settings.files, *([] if settings.matte is None else [settings.matte])]
         # a flare alone carries attributes of its plate
         made_of["plate"] = [digest_of(FramePattern(name).path(frame)) for name in named]

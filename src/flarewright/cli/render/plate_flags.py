@@ -48,7 +48,8 @@ def plate_settings(plate: str | None, options: PlateOptions) -> PlateSettings | 
     values = {
         "layer": options.plate_layer, "transfer": options.plate_transfer, "matte": options.flare_matte,
         "threshold": options.threshold, "stops": options.stops, "fade": options.fade, "least_px": options.least_pixels,
-        "most_lights": options.most_lights, "gain": options.plate_gain, "highlights": options.highlights,
-        "white": options.white, "source": None if options.source is None else parse_source(options.source),
+        "most_lights": options.most_lights, "point_px": options.point_size, "gain": options.plate_gain,
+        "highlights": options.highlights, "white": options.white,
+        "source": None if options.source is None else parse_source(options.source),
     }  # fmt: skip
     return PlateSettings(plate, **{key: value for key, value in values.items() if value is not None})  # type: ignore[arg-type]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from fractions import Fraction
+from math import prod
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,7 +14,7 @@ import numpy as np
 from ...errors import FileError, optional
 from ...model.project.camera import Colorspace
 from ...typing import Pixels
-from ..files.door import outside, shown
+from ..files.door import outside, refuse_claim, shown
 from .exr import CHROMATICITIES, read_exr_layer
 from .picture import SCREEN, decode_srgb
 
@@ -46,8 +47,8 @@ class PlatePicture:
         Primaries that the file states; None if it states none, or others.
     pixel_aspect : float
     fps : Fraction or None
-    header : dict
-        Attributes of an EXR file that stay with the picture: timeCode, framesPerSecond and the camera's.
+    header : dict or None
+        Attributes of an EXR file that stay with the picture: timeCode and the camera's.
     remarks : tuple of str
     """
 
@@ -68,7 +69,7 @@ class PlatePicture:
 
 # attributes of OpenEXR's standard list that describe the photograph, not the file
 _KEPT = (
-    "timeCode", "framesPerSecond", "keyCode", "owner", "capDate", "utcOffset", "isoSpeed", "expTime", "reelName",
+    "timeCode", "keyCode", "owner", "capDate", "utcOffset", "isoSpeed", "expTime", "reelName",
     "cameraMake", "cameraModel", "cameraSerialNumber", "imageCounter",
 )  # fmt: skip
 
@@ -176,8 +177,15 @@ def _depth(image: Any) -> int:
 
 def _tiff(path: Path, transfer: Transfer | None) -> PlatePicture:
     tifffile = optional("tifffile", "photo", f"reading {shown(path)}")
-    with outside(path, "a plate", pixel_bytes=16, remedy="save it as EXR or 16-bit TIFF"):
-        values = np.asarray(tifffile.imread(path, key=0))
+    with (
+        outside(path, "a plate", remedy="save it as EXR or 16-bit TIFF") as stream,
+        tifffile.TiffFile(stream) as file,
+    ):
+        page = file.pages[0]
+        shape, size = tuple(page.shape), np.dtype(page.dtype).itemsize
+        # the values, and linear pixels
+        refuse_claim(path, " x ".join(map(str, shape)), prod(shape) * (size + 8))
+        values = np.asarray(page.asarray())
         if values.ndim == 3 and values.shape[0] in (3, 4) and values.shape[2] not in (3, 4):
             values = np.moveaxis(values, 0, 2)
         if values.ndim == 2:

@@ -40,6 +40,7 @@ ABOUT = {
     "lights.field_deg": "degrees right and up in the picture",
     "lights.distance": "2000.0   # mm in front of the first vertex; default: infinity",
     "lights.shape": '{ kind = "rectangle", size_deg = [4.0, 3.0], rotation_deg = 15.0 }   # or "polygon", corners_deg',
+    "lights.starburst": "false: without its direct image, which a plate shows already",
     "lights.holdout": '{ image = "leaves.png", invert = true }   # hides only this light',
     "lights.motion": '"linear" or "smooth", between keyframes',
     "timeline.fps": "frames per second of a shot",

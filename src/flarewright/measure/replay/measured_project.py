@@ -42,7 +42,7 @@ _OF_LENSES = ("iris", "coating", "dirt", "starburst", "zoom", "filter", "imperfe
 _OF_CAMERAS = (
     "sensor_distance", "focus_distance", "cover_glass", "sensor_reflectance", "sensor_grating", "squeeze", "desqueeze",
 )  # fmt: skip
-_OF_LIGHTS = ("distance", "diameter_deg", "shape")
+_OF_LIGHTS = ("distance", "diameter_deg", "shape", "starburst")
 # prefix of the layer of one ghost
 _SINGLE = "ghost."
 # the pass of art direction whose gain applies to each layer; the residual of ghosts belongs to the ghosts

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, StrictBool, ValidationInfo, field_validator, model_validator
 
 from ..base import Frozen
 from .animation import LARGEST_INTENSITY, LAST_S, LightCurve, Motion, one_curve_each
@@ -146,6 +146,8 @@ class Light(Frozen):
         Angular diameter of a round light, 0.53 for the sun, 0 for a point.
     shape : Rectangle or Polygon or None
         Area light instead of a disc or point. Its radiance is uniform; `intensity` is its total.
+    starburst : bool
+        Whether its direct image is drawn, with its diffraction. False for a light that the plate below shows already.
     holdout : Holdout or None
         Holdout of this light, in addition to the project's.
     keyframes : tuple of LightKey
@@ -163,6 +165,7 @@ class Light(Frozen):
     spectrum: Spectrum = D65()
     diameter_deg: float = Field(0.0, ge=0.0, le=60.0)
     shape: Shape | None = None
+    starburst: StrictBool = True
     holdout: Holdout | None = None
     # as many as a curve has: one a frame of a long track
     keyframes: tuple[LightKey, ...] = Field((), max_length=10000)

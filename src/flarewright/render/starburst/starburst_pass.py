@@ -82,7 +82,7 @@ def starburst_of(
     *,
     threads: int | None = None,
 ) -> Layer:
-    """Draw the direct image of every light, spread by diffraction at the iris.
+    """Draw the direct image of every light that has a starburst, spread by diffraction at the iris.
 
     Parameters
     ----------
@@ -113,7 +113,8 @@ def starburst_of(
     scene = _Scene(settled, mask, soil, look)
     width, height = shots[0].size_px
     total = np.zeros((height, width, 3), dtype=np.float32)
-    lights = [list(of_one) for _, of_one in groupby(zip(shots, images, strict=True), lambda pair: pair[0].number)]
+    pairs = [pair for pair in zip(shots, images, strict=True) if project.lights[pair[0].number].starburst]
+    lights = [list(of_one) for _, of_one in groupby(pairs, lambda pair: pair[0].number)]
     groups, others = _group_by_pattern(scene, lights)
     for group in groups:
         total += _many_lights(scene, group, threads)

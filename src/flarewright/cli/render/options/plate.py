@@ -54,8 +54,15 @@ class PlateOptions:
     ] = None
     most_lights: Annotated[
         int | None,
-        typer.Option(help="Lights a frame; fainter ones are joined (default: 32).", rich_help_panel=PANEL),
+        typer.Option(help="Lights a frame; fainter ones are joined (default: 48).", rich_help_panel=PANEL),
     ] = None
+    point_size: Annotated[
+        float | None,
+        typer.Option(
+            metavar="PX", help="Sources narrower than this are points (default: 0.5 % of the width).",
+            rich_help_panel=PANEL,
+        ),
+    ] = None  # fmt: skip
     fade: Annotated[
         int | None,
         typer.Option(
