@@ -67,7 +67,7 @@ def test_a_still_gives_a_flare_and_a_comp(capsys, folder):
         ("--most-lights 0", "0 lights are not possible"),
         ("--intensity 3", "--intensity is for a --light, and none is given; --plate-gain changes"),
         ("--over photo.exr --size 32x32", "of another shape"),
-        ("--over f.exr", "--over f.exr would replace f.exr"),
+        ("--over f.exr", "f.exr would replace f.exr, which the shot reads or writes; rename it"),
     ],
 )
 def test_flags_that_do_not_fit_are_refused(capsys, folder, words, sentence):

@@ -18,6 +18,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 import flarewright
 from flarewright.io.lens.library import lens_path, library_names
@@ -113,6 +114,14 @@ class Trial:
 
 def _project(folder: Path) -> None:
     (folder / "shot.toml").write_text(PROJECT)
+
+
+def _plates(folder: Path) -> None:
+    """Write six plates with a lamp that moves."""
+    for k in range(6):
+        pixels = np.full((90, 160, 3), 40, np.uint8)
+        pixels[30:36, 20 * k + 10 : 20 * k + 16] = 255
+        Image.fromarray(pixels).save(folder / f"plate.{k + 1:04d}.png")
 
 
 def _model(folder: Path) -> None:
@@ -235,6 +244,9 @@ TRIALS = {
     "library thumbnails": Trial(
         ("library", "thumbnails"), ("state/library/thumbnails/*.jpg",),
         prepare=lambda folder: (_lenses(folder), _run(folder, ("library", "add", "lenses")), None)[-1],
+    "sources": Trial(
+        ("sources", "plate.####.png", "--csv", "out.csv", "--marked", "out.####.png"), ("out.csv", "out.*.png"),
+        prepare=_plates,
     ),
     "dataset": Trial(
         ("dataset", "pairs.toml", "-n", "24", "--processes", "2", "-o", "out"), ("out/*",),

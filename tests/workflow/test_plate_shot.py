@@ -201,3 +201,20 @@ def test_a_threshold_in_stops_is_one_for_the_whole_shot(plates):
     found = plate_shot(settings(plates, stops=4.0), [1001, 1002, 1003])
     assert found.threshold == pytest.approx(0.1 * 16, rel=0.1)
     assert "4 stops above the plate's mean" in found.remarks[0]
+
+
+def test_one_picture_lights_all_frames(plates, tmp_path):
+    still = PlateSettings(str(plates / "p.1001.exr"), threshold=1.0)
+    result = draw(plates, tmp_path, frames="7-8", plate=still)
+    assert [frame.frame for frame in result.frames] == [7, 8]
+    one, two = (read_exr(tmp_path / f"c.{frame:04d}.exr").layers[0].pixels for frame in (7, 8))
+    assert np.array_equal(one, two)
+
+
+def test_no_frame_of_the_plate_is_replaced(plates):
+    before = (plates / "p.1001.exr").read_bytes()
+    with pytest.raises(FlarewrightError, match=r"would replace p\.1001\.exr, which the shot reads or writes"):
+        shot(project(), plates / "p.####.exr", plate=settings(plates, threshold=1.0))
+    with pytest.raises(FlarewrightError, match=r"would replace p\.1001\.exr"):
+        draw(plates, plates, over=plates / "p.%04d.exr")
+    assert (plates / "p.1001.exr").read_bytes() == before

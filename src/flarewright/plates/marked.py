@@ -27,8 +27,8 @@ def light_rows(plate: PlateTracks, frame: int) -> list[dict[str, float | int | s
     Returns
     -------
     list of dict
-        "light" (number), "kind" (point, disc or rectangle), "x", "y", "width", "height" in pixels, "rotation_deg", "r",
-        "g", "b" (sums of pixel values), and "share" of the light of the frame.
+        "light" (number), "kind" (point, disc, rectangle, or joined of many), "x", "y", "width", "height" in pixels,
+        "rotation_deg", "r", "g", "b" (sums of pixel values), and "share" of the light of the frame.
     """
     tracks = plate.tracks
     at = int(np.searchsorted(tracks.frames, frame).clip(0, len(tracks.frames) - 1))
@@ -38,6 +38,7 @@ def light_rows(plate: PlateTracks, frame: int) -> list[dict[str, float | int | s
     for k in sorted(np.flatnonzero(sums > 0.0), key=lambda k: (-sums[k], k)):
         sides, angle = _sides(tracks.moments_px2[k, at])
         kind = "point" if not plate.extended[k] else "disc" if plate.round[k] else "rectangle"
+        kind = "joined" if k >= len(tracks) - plate.joined else kind
         x, y = tracks.centre_px[k, at]
         r, g, b = light[k]
         rows.append(

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
+from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from ..io.files.atomic_write import write_atomically
 from ..io.files.door import outside_arrays
 from ..io.files.text_file import digest_of
 from ..io.images.plate_image import read_matte
-from ..io.images.plate_picture import PlatePicture, read_plate
+from ..io.images.plate_picture import PlatePicture, Transfer, read_plate
 from ..jobs.frame_list import FramePattern, frames_text
 from ..jobs.processes import shares, work_off
 from ..plates.detection import LUMINANCE, Sources, find_sources, mean_luminance
@@ -40,6 +41,10 @@ _MEAN_FRAMES = 24
 _BELOW_WHITE = 0.9
 # sources of one frame; more are noise
 _MOST_SOURCES = 20_000
+# frames for which a further process pays
+_FRAMES_A_PROCESS = 6
+# values of all tracks in all frames
+_MOST_VALUES = 2e8
 # seconds between two writes of the partial result
 _SAVE_S = 10.0
 _FIND = "flarewright.workflow.plate_sources:sources_of_frame"
@@ -134,14 +139,23 @@ def _check_all_there(pattern: FramePattern, frames: Sequence[int], what: str) ->
 
 
 def plate_picture(settings: PlateSettings, frame: int) -> PlatePicture:
-    """Read the plate of a frame.
+    """Read the plate of a frame; the last one is kept in memory.
 
     Raises
     ------
     FileError
         It cannot be read.
     """
-    return read_plate(FramePattern(settings.files).path(frame), layer=settings.layer, transfer=settings.transfer)
+    path = FramePattern(settings.files).path(frame)
+    changed_ns = path.stat().st_mtime_ns if path.is_file() else 0
+    return _picture(str(path), changed_ns, settings.layer, settings.transfer)
+
+
+@lru_cache(maxsize=1)
+def _picture(path: str, _: int, layer: str | None, transfer: Transfer | None) -> PlatePicture:
+    picture = read_plate(path, layer=layer, transfer=transfer)
+    picture.pixels.flags.writeable = False
+    return picture
 
 
 def plate_matte(settings: PlateSettings, frame: int, size_px: tuple[int, int]) -> Pixels | None:
@@ -259,6 +273,12 @@ def plate_shot(
     dark = [frame for frame, each in zip(frames, found, strict=True) if not len(each)]
     if dark:
         remarks.append(f"no source in frame{'s'[: len(dark) > 1]} {frames_text(dark)[:80]}")
+    # a track has nine values a frame; noise starts new tracks in every frame
+    if 9.0 * sum(map(len, found)) * len(found) > _MOST_VALUES and not still:
+        raise ProjectError(
+            f"the plate has {sum(map(len, found))} sources in {len(found)} frames, too many to follow; raise the "
+            "threshold, or leave small ones out (--least-pixels 4)"
+        )
     # a still needs no memory of what came before
     tracks = follow(
         frames[:1] if still else frames,
@@ -321,18 +341,24 @@ def _searched(
     known = {} if kept is None else _read(kept)
     found = {frame: known[digest] for frame, digest in made_of.items() if digest in known}
     todo = [frame for frame in frames if frame not in found]
-    number, each = shares(len(todo), processes)
-    saved = time.monotonic()
-    for one in work_off(_FIND, search, todo, processes=number, threads=each, what="frame"):
-        table, frame = one.result
-        found[frame] = table
-        if report is not None:
-            report(frame, len(found), len(frames))
-        if kept is not None and time.monotonic() - saved > _SAVE_S:
-            _write(kept, {made_of[frame]: table for frame, table in found.items()})
-            saved = time.monotonic()
+    # a process starts in the time of some frames
+    number, each = shares(len(todo), min(processes, max(1, len(todo) // _FRAMES_A_PROCESS)))
     if kept is not None and todo:
-        _write(kept, {made_of[frame]: found[frame] for frame in frames})
+        _check_ours(kept)
+    saved = time.monotonic()
+    try:
+        for one in work_off(_FIND, search, todo, processes=number, threads=each, what="frame"):
+            table, frame = one.result
+            found[frame] = table
+            if report is not None:
+                report(frame, len(found), len(frames))
+            if kept is not None and time.monotonic() - saved > _SAVE_S:
+                _write(kept, {made_of[frame]: table for frame, table in found.items()})
+                saved = time.monotonic()
+    finally:
+        # also after Ctrl-C
+        if kept is not None and todo and found:
+            _write(kept, {made_of[frame]: found[frame] for frame in frames if frame in found})
     return found
 
 
@@ -384,10 +410,14 @@ def _read(path: Path) -> dict[str, Floats]:
     return dict(zip((str(name) for name in names), np.split(tables, np.cumsum(counts)[:-1]), strict=True))
 
 
-def _write(path: Path, found: dict[str, Floats]) -> None:
-    """Write the sources; a file of another program is not replaced."""
+def _check_ours(path: Path) -> None:
+    """Raise an error if the sources would replace a file of another program."""
     if path.exists() and not _read(path):
-        raise FlarewrightError(f"{path} is no file of sources of a plate; move it, or choose another name for -o")
+        raise FlarewrightError(f"{path} is no file of sources of a plate; move it, or choose another output name")
+
+
+def _write(path: Path, found: dict[str, Floats]) -> None:
+    """Write the sources."""
     tables = list(found.values())
 
     def write(temporary: Path) -> None:

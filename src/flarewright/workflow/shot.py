@@ -136,7 +136,8 @@ def shot(
     numbers, remarks = shot_frames(project, frames, plate)
     pattern.check(numbers)
     _check_output(pattern)
-    comp = _comp_pattern(over, pattern, plate, numbers)
+    comp = _comp_pattern(over, plate, numbers)
+    _keep_sequences(project, plate, pattern, comp, numbers)
     mine = numbers if chunk is None else chunk_of(numbers, *parse_chunk(chunk))
     if shutter_deg == 0.0 and subframes is not None and subframes > 1:
         remarks.append("sub-frames have no effect without an open shutter: give its angle, such as 180 degrees")
@@ -161,12 +162,7 @@ def shot(
     return ShotResult(tuple(done), (*remarks, *_remarks(done)), number, found)
 
 
-def _comp_pattern(
-    over: str | os.PathLike[str] | None,
-    output: FramePattern,
-    plate: PlateSettings | None,
-    frames: Sequence[int],
-) -> str:
+def _comp_pattern(over: str | os.PathLike[str] | None, plate: PlateSettings | None, frames: Sequence[int]) -> str:
     """Return the checked file name of the comps; empty if none is wanted."""
     if over is None:
         return ""
@@ -175,11 +171,23 @@ def _comp_pattern(
     pattern = FramePattern(os.fspath(over))
     pattern.check(frames)
     _check_output(pattern)
-    named = {name: FramePattern(name).path(frames[0]) for name in (output.text, plate.files)}
-    for name, path in named.items():
-        if path.resolve() == pattern.path(frames[0]).resolve():
-            raise ProjectError(f"--over {pattern.text} would replace {name}; choose another name")
     return pattern.text
+
+
+def _keep_sequences(
+    project: Project, plate: PlateSettings | None, output: FramePattern, comp: str, frames: Sequence[int]
+) -> None:
+    """Raise an error if a frame would replace one that is read, or another one that is written."""
+    holdouts = [project.holdout, *(light.holdout for light in project.lights)]
+    read = [name for each in holdouts if each is not None for name in (each.image, each.depth)]
+    read += [] if plate is None else [plate.files, plate.matte]
+    known = {FramePattern(name).path(frame).resolve() for name in read if name is not None for frame in frames}
+    for pattern in (output, *([FramePattern(comp)] if comp else [])):
+        written = {pattern.path(frame).resolve() for frame in frames}
+        if written & known:
+            taken = min(written & known)
+            raise ProjectError(f"{pattern.text} would replace {taken.name}, which the shot reads or writes; rename it")
+        known |= written
 
 
 def _searched(

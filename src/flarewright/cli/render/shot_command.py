@@ -173,13 +173,6 @@ def _keep_inputs(options: ShotOptions, project: Project, plate: PlateSettings | 
     frames = shot_frames(project, parsed_frames(options.frames), plate)[0]
     outputs = [FramePattern(name).path(frame) for name in (options.output, options.over) if name for frame in frames]
     keep_inputs(project, options.project, outputs)
-    if plate is None:
-        return
-    read = [FramePattern(name) for name in (plate.files, plate.matte) if name is not None]
-    inputs = {pattern.path(frame).resolve() for pattern in read for frame in frames}
-    for output in outputs:
-        if output.resolve() in inputs:
-            raise ProjectError(f"{output} would replace a frame of the plate; choose another name")
 
 
 def _plate_data(plate: PlateShot) -> dict[str, Any]:

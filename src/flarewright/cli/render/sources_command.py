@@ -66,18 +66,21 @@ def sources(options: SourcesOptions) -> None:
     frames = plate_frames(settings, parsed_frames(options.frames), 1)
     marked = _marked_pattern(options.marked, settings, frames)
     _check_table(options.table)
+    kept = _kept(options)
     with one_bar("finding lights") as progress:
 
         def report(frame: int, done: int, of: int) -> None:
             if progress is not None:
                 progress(done / of, f"frame {frame}")
 
-        found = plate_shot(settings, frames, report=report)
+        found = plate_shot(settings, frames, kept=kept, report=report)
     rows = [{"frame": frame, **row} for frame in frames for row in light_rows(found.lights, frame)]
     if marked is not None:
         _write_marked(marked, found, settings, frames)
     if options.table is not None:
         _write_table(options.table, rows)
+    if kept is not None:
+        kept.unlink(missing_ok=True)
     print_remarks(found.remarks)
     if options.as_json:
         print_json(
@@ -116,6 +119,14 @@ def _marked_pattern(text: str | None, settings: PlateSettings, frames: tuple[int
     if any(pattern.path(frame).resolve() in inputs for frame in frames):
         raise ProjectError(f"--marked {text} would replace a frame of the plate; choose another name")
     return pattern
+
+
+def _kept(options: SourcesOptions) -> Path | None:
+    """Return the file for partial work, beside the output; without one a repeated command starts again."""
+    from ...workflow.plate_sources import sources_file
+
+    output = options.table or options.marked
+    return None if output is None else sources_file(str(output))
 
 
 def _check_table(path: Path | None) -> None:
