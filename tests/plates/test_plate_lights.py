@@ -96,6 +96,18 @@ def test_points_discs_and_rectangles_keep_their_size(lens):
     assert not any(light.extended for light in far)
 
 
+def test_an_area_light_at_the_edge_of_a_fisheye_is_a_point():
+    camera = Camera(size_px=SIZE)
+    settled = resolve_project(Project(lens="fisheye-nikkor-10.5", lights=[Light(field_deg=(0, 0))], camera=camera))
+    pixels = plate()
+    pixels[16:20, 6:12] = 9.0
+    pixels[16:20, 30:38] = 9.0
+    lights, lost = lights_at(tracks_of(pixels), 1, field_map(settled), 1.0, SIZE)
+    assert lost == 0.0
+    assert sorted(light.extended for light in lights if abs(light.field_deg[0]) < 60) == [True]
+    assert [light.extended for light in lights if abs(light.field_deg[0]) > 60] == [False]
+
+
 def test_lights_move_between_frames(lens):
     _, _, directions, factor = lens
     shot = tracks_of(plate((20, 18, 1.0, 10.0)), plate((22, 18, 1.0, 30.0)))

@@ -31,6 +31,8 @@ _POINT_PART, _POINT_PX = 0.005, 3.0
 _ROUND = 1.3
 # widest light, degrees, below that of the model
 _WIDEST_DEG, _WIDEST_DISC_DEG = 110.0, 60.0
+# an area light that reaches farther from the axis is a point: its corners would lie beside the camera, degrees
+_FARTHEST_DEG = 85.0
 
 
 @dataclass(frozen=True)
@@ -209,6 +211,9 @@ def lights_at(plate: PlateTracks, frame: float, directions: FieldMap, factor: fl
             # pixels of the plate to degrees, along the field angles X and Y
             per_px = np.degrees(change[k] / (1.0 + slopes[k][:, None] ** 2)) * scale
             shape = _rectangle(per_px, moments[k])
+        reach = np.abs(field).max() + 0.5 * (diameter if shape is None else float(np.hypot(*shape.size_deg)))
+        if reach > _FARTHEST_DEG or degrees(np.arctan(np.hypot(*slopes[k]))) + 0.5 * diameter > _FARTHEST_DEG:
+            shape, diameter = None, 0.0
         found.append(
             Light(
                 name=f"plate-{k + 1}",
