@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from math import pi
 
 import numpy as np
@@ -11,6 +12,7 @@ from flarewright import Camera, Light, Project, Quality, render
 from flarewright.errors import ProjectError
 from flarewright.plates.detection import LUMINANCE, find_sources
 from flarewright.plates.field_map import field_map
+from flarewright.plates.joining import joined
 from flarewright.plates.lights import lights_at, plate_factor, plate_tracks
 from flarewright.plates.measured_plate import expanded
 from flarewright.plates.settings import PlateSettings, parse_source
@@ -146,6 +148,52 @@ def test_the_sun_and_lamps_of_known_brightness_follow_the_white_of_the_plate(len
     half[:, :20] = 0.0
     covered = tracks_of(plate((20, 18, 2.0, 1.05)), half, known=parse_source("sun"), **given)
     assert lights_at(covered, 2, directions, 1.0, SIZE)[0][0].intensity == pytest.approx(0.5 * pi * 0.9, rel=0.01)
+
+
+def test_joined_lights_have_ghosts_and_no_image(lens):
+    project, _, directions, factor = lens
+    pixels = plate((32, 18, 1.0, 40.0), (20, 10, 1.0, 5.0), (24, 12, 1.0, 5.0))
+    found = follow([1], [find_sources(pixels, 1.0)], SIZE[0])
+    limited, _, number = joined(found, 2)
+    lights, _ = lights_at(plate_tracks(limited, SIZE, joined=number), 1, directions, factor, SIZE)
+    assert [light.starburst for light in lights] == [True, False]
+    alone = project.replace(lights=lights[1:])
+    layers = {layer.name: layer.pixels for layer in render(alone).layers}
+    assert not layers["starburst"].any()
+    assert np.array_equal(layers["ghosts"], layers["beauty"])
+    assert layers["ghosts"].any()
+    # an image of both lamps would lie between them
+    both = {layer.name: layer.pixels for layer in render(project.replace(lights=lights)).layers}
+    first = {layer.name: layer.pixels for layer in render(project.replace(lights=lights[:1])).layers}
+    assert np.array_equal(both["starburst"], first["starburst"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["draft", "final"])
+def test_two_thousand_sources_cost_at_most_twenty_times_one(mode):
+    large = (480, 270)
+    project = Project(
+        lens="heliar-tronnier", f_number=8.0, lights=[Light(field_deg=(0.0, 0.0))], camera=Camera(size_px=large),
+        quality=Quality(mode=mode),
+    )  # fmt: skip
+    settled = resolve_project(project)
+    directions = field_map(settled)
+    factor = plate_factor(settled, directions)
+    rng = np.random.default_rng(8)
+    seconds = []
+    # the first picture loads kernels
+    for number in (1, 1, 2000):
+        pixels = np.zeros((270, 480, 3), np.float32)
+        places = rng.permutation(89 * 159)[:number]
+        pixels[3 * (places // 159) + 1, 3 * (places % 159) + 1] = rng.uniform(2.0, 90.0, (number, 3))
+        started = time.process_time()
+        found = find_sources(pixels, 1.0)
+        assert len(found) == number
+        limited, _, groups = joined(follow([1], [found], large[0]), PlateSettings("a.exr").most_lights)
+        lights, _ = lights_at(plate_tracks(limited, large, joined=groups), 1, directions, factor, large)
+        render(project.replace(lights=lights), threads=1)
+        seconds.append(time.process_time() - started)
+    assert seconds[2] < 20.0 * seconds[1]
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,7 @@ class PlateSettings:
     knee_stops: float = 1.0
     fade: int = 4
     least_px: int = 1
-    most_lights: int = 48
+    most_lights: int = 32
     point_px: float | None = None
     gain: float = 1.0
     highlights: float | None = None

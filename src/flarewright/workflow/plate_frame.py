@@ -131,9 +131,9 @@ def alike_lights(projects: Sequence[Project]) -> list[Project]:
     return found
 
 
-def check_plate(project: Project, plate: PlateShot) -> None:
-    """Raise ProjectError if a project's picture has another shape than the plate."""
-    (width, height), (wide, high) = project.camera.size_px, plate.size_px
+def check_plate(project: Project, size_px: tuple[int, int]) -> None:
+    """Raise ProjectError if a project's picture has another shape than a plate of a size."""
+    (width, height), (wide, high) = project.camera.size_px, size_px
     # whole pixels on both sides
     if abs(wide * height / (width * high) - 1.0) > _SHAPE_TOLERANCE + 1.0 / min(width, height):
         raise ProjectError(
@@ -142,11 +142,11 @@ def check_plate(project: Project, plate: PlateShot) -> None:
         )
 
 
-def check_comp(project: Project, plate: PlateShot) -> None:
-    """Raise ProjectError if a project's passes cannot be laid over the plate."""
-    if project.camera.size_px != plate.size_px:
+def check_comp(project: Project, size_px: tuple[int, int]) -> None:
+    """Raise ProjectError if a project's passes cannot be laid over a plate of a size."""
+    if project.camera.size_px != size_px:
         raise ProjectError(
-            f"the comp needs the size of the plate, {plate.size_px[0]}x{plate.size_px[1]}, not "
+            f"the comp needs the size of the plate, {size_px[0]}x{size_px[1]}, not "
             f"{project.camera.size_px[0]}x{project.camera.size_px[1]}; omit --size or --over"
         )
     if project.output.layers == "beauty":

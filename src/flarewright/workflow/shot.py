@@ -203,24 +203,27 @@ def _searched(
     """Find the sources of the plate in all frames of the shot, whichever of them this process draws."""
     from ..kernels.jit.warmup_processes import cores
     from .plate_frame import check_comp, check_plate
-    from .plate_sources import plate_shot, sources_file
+    from .plate_sources import plate_picture, plate_shot, sources_file
 
-    found = plate_shot(
+    size_px = plate_picture(plate, frames[0]).size_px
+    check_plate(project, size_px)
+    if comp:
+        check_comp(project, size_px)
+    return plate_shot(
         plate, frames, kept=sources_file(output.text), processes=processes or threads or cores(), report=report
     )
-    check_plate(project, found)
-    if comp:
-        check_comp(project, found)
-    return found
+
+
+def _sequences(project: Project) -> list[FramePattern]:
+    """Return the sequences of images that hide lights."""
+    holdouts = [project.holdout, *(light.holdout for light in project.lights)]
+    names = {name for each in holdouts if each is not None for name in (each.image, each.depth) if name is not None}
+    return [pattern for pattern in map(FramePattern, sorted(names)) if pattern.numbered]
 
 
 def _check_sequences(project: Project, frames: Sequence[int]) -> None:
     """Raise an error before the work if a frame of a sequence that hides lights is missing."""
-    holdouts = [project.holdout, *(light.holdout for light in project.lights)]
-    names = {name for each in holdouts if each is not None for name in (each.image, each.depth) if name is not None}
-    for pattern in map(FramePattern, sorted(names)):
-        if not pattern.numbered:
-            continue
+    for pattern in _sequences(project):
         there = set(pattern.on_disk())
         missing = [frame for frame in frames if frame not in there]
         if missing:
@@ -262,7 +265,7 @@ def shot_frames(
     assert numbers is not None
     if is_still(project):
         alike = "nothing in the project moves: all frames are alike"
-        return numbers, [alike] if len(numbers) > 1 else []
+        return numbers, [alike] if len(numbers) > 1 and not _sequences(project) else []
     outside = [frame for frame in numbers if not timeline.start <= frame <= last]
     if len(outside) == len(numbers):
         raise ProjectError(

@@ -54,7 +54,7 @@ class PlateOptions:
     ] = None
     most_lights: Annotated[
         int | None,
-        typer.Option(help="Lights a frame; fainter ones are joined (default: 48).", rich_help_panel=PANEL),
+        typer.Option(help="Lights a frame; fainter ones are joined (default: 32).", rich_help_panel=PANEL),
     ] = None
     point_size: Annotated[
         float | None,
