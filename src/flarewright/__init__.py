@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     from .model import Tabulated as Tabulated
     from .model import Timeline as Timeline
     from .model.project.dataset import DatasetSpec as DatasetSpec
+    from .plates.settings import PlateSettings as PlateSettings
     from .render.analysis import ghosts as ghosts
     from .render.analysis import paraxial as paraxial
     from .render.render import Rendering as Rendering
@@ -102,6 +103,7 @@ _HOMES = {
     ".io.project.project_file": ("read_project",),
     ".measure.replay.measured_project": ("render_measured",),
     ".model.project.dataset": ("DatasetSpec",),
+    ".plates.settings": ("PlateSettings",),
     ".render.analysis": ("ghosts", "paraxial"),
     ".render.scene.looks": ("look_of", "with_look"),
     ".render.scene.photographic_defaults": ("as_photographed",),

@@ -51,7 +51,8 @@ def test_a_still_gives_a_flare_and_a_comp(capsys, folder):
         "area_lights": 1,
     }  # fmt: skip
     assert read_exr("f.exr").size_px == (64, 36)
-    assert read_exr("c.exr").layers[0].pixels[9, 41, 0] == pytest.approx(1.0, abs=0.2)
+    # the white of the plate stands for more
+    assert read_exr("c.exr").layers[0].pixels[9, 41, 0] > 5.0
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,11 @@ def test_passes_add_and_the_starburst_stays_out_of_the_light():
     assert comp[5, 9] == pytest.approx(30.1)
     assert comp[0, 0] == pytest.approx(5.3)
     assert (plate[0, 0] == np.float32(0.2)).all(), "the plate itself is unchanged"
+    # a plate that clips shows the light too dark: the brighter image counts
+    dark = composed(np.minimum(plate, 1.0), [star, ghosts], mask, too_dark=True).pixels
+    assert dark[5, 9] == pytest.approx(5.1)
+    assert dark[0, 0] == pytest.approx(5.3)
+    assert composed(plate, [star, ghosts], mask, too_dark=True).pixels[5, 9] == pytest.approx(30.1)
     # a window of a layer lies where it says
     part = composed(plate, [Layer("ghosts", np.ones((2, 3, 3), np.float32), (4, 5, 3, 2))], mask).pixels
     assert (part - plate).sum() == pytest.approx(18.0)

@@ -1,7 +1,8 @@
 """The comp: a plate with its flare.
 
 The plate shows the light sources already, as the camera has imaged them. So inside the found areas the starburst, whose
-core is the direct image of the light, is left out; everywhere else all passes add.
+core is the direct image of the light, is left out; everywhere else all passes add. Where the plate is known to show a
+light too dark, because it clips, the brighter of both images is shown: else a dark disc lies in a bright starburst.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def source_mask(pixels: Pixels, threshold: float, matte: Pixels | None = None) -
     return found
 
 
-def composed(plate: Pixels, layers: Sequence[Layer], mask: Pixels) -> Layer:
+def composed(plate: Pixels, layers: Sequence[Layer], mask: Pixels, *, too_dark: bool = False) -> Layer:
     """Add the flare to a plate.
 
     Parameters
@@ -56,6 +57,8 @@ def composed(plate: Pixels, layers: Sequence[Layer], mask: Pixels) -> Layer:
         Passes that add up, of the size of the plate, in units of the plate.
     mask : ndarray, shape (H, W)
         From `source_mask`.
+    too_dark : bool
+        Whether the plate shows its lights darker than they are.
 
     Returns
     -------
@@ -66,6 +69,11 @@ def composed(plate: Pixels, layers: Sequence[Layer], mask: Pixels) -> Layer:
     for layer in layers:
         x, y, width, height = layer.window
         window = (slice(y, y + height), slice(x, x + width))
-        light = layer.pixels * (1.0 - mask[window])[..., None] if layer.name == STARBURST else layer.pixels
+        light = layer.pixels
+        if layer.name == STARBURST:
+            inside = mask[window][..., None]
+            light = light * (1.0 - inside)
+            if too_dark:
+                light += inside * np.maximum(layer.pixels - plate[window], 0.0)
         total[window] += light
     return Layer("comp", total, (0, 0, plate.shape[1], plate.shape[0]))

@@ -185,7 +185,9 @@ def write_comp(
     mask = source_mask(measured_pixels(picture, plate.settings.highlights), plate.threshold, matte)
     passes = [layer for layer in layers if layer.name != _BEAUTY and not layer.name.startswith("ghost.")]
     passes = [layer for layer in passes if not layer.name.endswith(".variance")]
-    whole = composed(converted(picture, project.output.colorspace), passes, mask)
+    settings = plate.settings
+    too_dark = picture.white is not None or settings.gain > 1.0 or settings.source is not None
+    whole = composed(converted(picture, project.output.colorspace), passes, mask, too_dark=too_dark)
     write_exr(
         path,
         [whole],

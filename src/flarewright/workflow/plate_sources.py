@@ -323,8 +323,8 @@ def _threshold(settings: PlateSettings, frames: Sequence[int], first: PlatePictu
     if first.white is not None and found > _BELOW_WHITE * (settings.highlights or 1.0):
         found = _BELOW_WHITE * (settings.highlights or 1.0)
         words = (
-            f"sources are brighter than {found:.3g}, near the plate's white, for {settings.stops:g} stops above its "
-            f"mean of {mean:.3g} lie beyond"
+            f"sources are brighter than {found:.3g}, near the plate's white: {settings.stops:g} stops above its "
+            f"mean of {mean:.3g} would lie beyond it"
         )
     return found, [f"{words}; --threshold sets another value"]
 
