@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flarewright.errors import ProjectError
 from flarewright.plates.detection import LUMINANCE, Sources, find_sources, mean_luminance
 
 RNG = np.random.default_rng(3)
@@ -102,6 +103,14 @@ def test_a_mean_in_stops_hardly_depends_on_a_small_sun():
     assert dark == pytest.approx(0.2, rel=0.01)
     assert mean_luminance(disc(pixels, 80, 60, 3, 5000.0)) == pytest.approx(0.2, rel=0.1)
     assert mean_luminance(plate(0.0)) == 0.0
+
+
+def test_noise_above_the_threshold_is_refused_in_one_sentence():
+    noise = np.zeros((400, 400, 3), np.float32)
+    noise[::2, ::2] = 2.0
+    with pytest.raises(ProjectError, match="40000 sources above 1, which is noise; raise the threshold"):
+        find_sources(noise, 1.0)
+    assert len(find_sources(noise, 1.0, least_px=2)) == 0
 
 
 def test_a_table_of_sources_holds_all_of_them():

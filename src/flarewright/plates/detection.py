@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from ..errors import ProjectError
 from ..typing import Floats, Indices, Mask, Pixels
 
 __all__ = ["LUMINANCE", "DetectionSettings", "Sources", "find_sources", "mean_luminance", "plate_luminance"]
@@ -42,6 +43,8 @@ class DetectionSettings:
         Split an area whose halves differ more in the fraction of a channel.
     most_splits : int
         Depth to which an area is split.
+    most_areas : int
+        More are noise.
     """
 
     hot_factor: float = 8.0
@@ -50,6 +53,7 @@ class DetectionSettings:
     least_kurtosis: float = 1.45
     colour_step: float = 0.15
     most_splits: int = 4
+    most_areas: int = 20_000
 
 
 @dataclass(frozen=True)
@@ -139,6 +143,11 @@ def find_sources(
     Sources
         In the order of the areas' first pixels, row by row.
 
+    Raises
+    ------
+    ProjectError
+        There are more areas than `DetectionSettings.most_areas`.
+
     Notes
     -----
     With `least_px` of 1, the sums of `Sources.light` are the sums of the pixels above the threshold
@@ -162,6 +171,12 @@ def find_sources(
     labels, count = ndimage.label(over, structure=np.ones((3, 3), dtype=np.int8))
     if count == 0:
         return Sources.from_table(np.zeros((0, 10)))
+    areas = int((np.bincount(labels.ravel())[1:] >= least_px).sum())
+    if areas > settings.most_areas:
+        raise ProjectError(
+            f"the plate has {areas} sources above {threshold:.3g}, which is noise; raise the threshold, or leave small "
+            "ones out (--least-pixels 4)"
+        )
     rows, columns = np.nonzero(over)
     order = np.argsort(labels[rows, columns], kind="stable")
     rows, columns = rows[order], columns[order]

@@ -157,9 +157,9 @@ def plate_factor(settled: ResolvedProject, directions: FieldMap) -> float:
     return float(1.0 / (omega * across * down * throughput[(len(throughput) - 1) // 2]))
 
 
-def lights_at(plate: PlateTracks, frame: float, directions: FieldMap, factor: float, size_px: tuple[int, int]) -> tuple[
-    tuple[Light, ...], float
-]:  # fmt: skip
+def lights_at(
+    plate: PlateTracks, frame: float, directions: FieldMap, factor: float, size_px: tuple[int, int]
+) -> tuple[tuple[Light, ...], float]:
     """Return the lights of a plate at a frame.
 
     Parameters

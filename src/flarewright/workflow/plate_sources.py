@@ -39,8 +39,6 @@ __all__ = ["PlateShot", "plate_frames", "plate_picture", "plate_shot", "sources_
 _MEAN_FRAMES = 24
 # part of the clipping value that a threshold in stops stays below
 _BELOW_WHITE = 0.9
-# sources of one frame; more are noise
-_MOST_SOURCES = 20_000
 # frames for which a further process pays
 _FRAMES_A_PROCESS = 6
 # values of all tracks in all frames
@@ -191,7 +189,7 @@ def sources_of_frame(search: _Search, frame: int, threads: int | None = None) ->
     Raises
     ------
     FlarewrightError
-        The plate or its matte cannot be read, has another size, or has too many sources.
+        The plate or its matte cannot be read or has another size, or the plate has too many sources.
     """
     del threads
     plate = plate_picture(search.settings, frame)
@@ -206,11 +204,6 @@ def sources_of_frame(search: _Search, frame: int, threads: int | None = None) ->
         matte=plate_matte(search.settings, frame, search.size_px),
         least_px=search.settings.least_px,
     )
-    if len(found) > _MOST_SOURCES:
-        raise ProjectError(
-            f"frame {frame} of the plate has more than {_MOST_SOURCES} sources above {search.threshold:.3g}; raise "
-            "the threshold, or leave small ones out (--least-pixels 4)"
-        )
     return found.table, frame
 
 
@@ -405,7 +398,7 @@ def _read(path: Path) -> dict[str, Floats]:
         and (counts >= 0).all()
         and np.isfinite(tables).all()
     )
-    if not whole:
+    if not whole or not len(names):
         return {}
     return dict(zip((str(name) for name in names), np.split(tables, np.cumsum(counts)[:-1]), strict=True))
 

@@ -72,7 +72,7 @@ def test_display_pictures_are_decoded_and_say_so(tmp_path):
 
 
 def test_floating_point_tiffs_are_linear_and_deep_pngs_say_what_is_lost(tmp_path):
-    tifffile.imwrite(tmp_path / "p.tif", PIXELS)
+    tifffile.imwrite(tmp_path / "p.tif", PIXELS, photometric="rgb")
     plate = read_plate(tmp_path / "p.tif")
     assert np.array_equal(plate.pixels, PIXELS)
     assert plate.white is None
