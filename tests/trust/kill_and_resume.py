@@ -244,6 +244,7 @@ TRIALS = {
     "library thumbnails": Trial(
         ("library", "thumbnails"), ("state/library/thumbnails/*.jpg",),
         prepare=lambda folder: (_lenses(folder), _run(folder, ("library", "add", "lenses")), None)[-1],
+    ),
     "sources": Trial(
         ("sources", "plate.####.png", "--csv", "out.csv", "--marked", "out.####.png"), ("out.csv", "out.*.png"),
         prepare=_plates,

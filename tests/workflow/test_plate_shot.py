@@ -15,7 +15,7 @@ from flarewright.errors import FlarewrightError
 from flarewright.io.images.exr import read_exr
 from flarewright.model import Holdout
 from flarewright.plates.settings import PlateSettings
-from flarewright.workflow.plate_sources import plate_frames, plate_shot, sources_file
+from flarewright.workflow.plates.plate_sources import plate_frames, plate_shot, sources_file
 
 SIZE = (64, 36)
 ROWS, COLUMNS = np.mgrid[: SIZE[1], : SIZE[0]] + 0.5

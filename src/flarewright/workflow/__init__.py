@@ -20,8 +20,7 @@ The command line and other front ends call these functions; nothing here prints.
 - `keyframes`: `project_at`, a project with the values of its keyframes and curves at a time
 - `light_places`: `lights_at_pixels` and `with_tracks`, lights whose places are given in pixels
 - `sun_place`: `sun_place`, where a camera sees the sun
-- `plate_sources`: `plate_shot` finds and follows the lights of a plate; `PlateShot`
-- `plate_frame`: `with_plate_lights`, a frame's project over a plate; `write_comp`
+- `plates`: shots over plates: `plate_shot` finds lights, `write_comp` writes comps
 - `shot`: `shot` draws the frames of a moving project on all cores, with a `ShotResult`
 - `shot_frame`: `draw_frame`, one of them, and the digest of what made it
 - `nuke_script`: `nuke_script`, the text of a script or gizmo that composites a flare in Nuke

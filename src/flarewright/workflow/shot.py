@@ -17,7 +17,7 @@ from .keyframes import frame_rate, is_still, length_s, time_of
 
 if TYPE_CHECKING:
     from ..plates.settings import PlateSettings
-    from .plate_sources import PlateShot
+    from .plates.plate_sources import PlateShot
     from .shot_frame import FrameResult, ShotPlan
 
 __all__ = ["ShotResult", "parsed_frames", "shot", "shot_frames"]
@@ -202,8 +202,8 @@ def _searched(
 ) -> PlateShot:
     """Find the sources of the plate in all frames of the shot, whichever of them this process draws."""
     from ..kernels.jit.warmup_processes import cores
-    from .plate_frame import check_comp, check_plate
-    from .plate_sources import plate_picture, plate_shot, sources_file
+    from .plates.plate_frame import check_comp, check_plate
+    from .plates.plate_sources import plate_picture, plate_shot, sources_file
 
     size_px = plate_picture(plate, frames[0]).size_px
     check_plate(project, size_px)
@@ -252,7 +252,7 @@ def shot_frames(
         There are none, or all of them lie outside the time in which the project moves.
     """
     if plate is not None:
-        from .plate_sources import plate_frames
+        from .plates.plate_sources import plate_frames
 
         return plate_frames(plate, parsed_frames(frames), project.timeline.start), []
     timeline, long_s = project.timeline, length_s(project)

@@ -27,8 +27,8 @@ from ..render.render import render as render_project
 from ..render.scene.resolve import open_lens, resolve_project
 from .keyframes import frame_rate, peak_intensity, project_at, still, time_of
 from .motion_blur import mean_layers, subframe_count, subframe_times
-from .plate_frame import alike_lights, comp_attributes, with_frame_files, with_plate_lights, write_comp
-from .plate_sources import PlateShot
+from .plates.plate_frame import alike_lights, comp_attributes, with_frame_files, with_plate_lights, write_comp
+from .plates.plate_sources import PlateShot
 
 __all__ = ["FrameResult", "ShotPlan", "draw_frame", "frame_project", "part_name"]
 

@@ -21,7 +21,7 @@ from .options.shot import ShotOptions
 if TYPE_CHECKING:
     from ...model import Project
     from ...plates.settings import PlateSettings
-    from ...workflow.plate_sources import PlateShot
+    from ...workflow.plates.plate_sources import PlateShot
     from ...workflow.shot_frame import FrameResult
 
 EPILOG = (
@@ -139,7 +139,7 @@ def _sequences(options: ShotOptions) -> tuple[ShotOptions, dict[str, str]]:
 
 def _over_plate(options: ShotOptions, plate: PlateSettings) -> tuple[ShotOptions, list[str]]:
     """Return the options with what a plate states: its size and its rate; and remarks."""
-    from ...workflow.plate_sources import plate_frames, plate_picture
+    from ...workflow.plates.plate_sources import plate_frames, plate_picture
     from ...workflow.shot import parsed_frames
 
     first = plate_picture(plate, plate_frames(plate, parsed_frames(options.frames), options.start or 1)[0])

@@ -17,7 +17,7 @@ from .plate_flags import plate_settings
 
 if TYPE_CHECKING:
     from ...plates.settings import PlateSettings
-    from ...workflow.plate_sources import PlateShot
+    from ...workflow.plates.plate_sources import PlateShot
 
 EPILOG = (
     "Examples:\n\nflarewright sources photo.exr --marked marked.png\n\n"
@@ -58,7 +58,7 @@ def sources(options: SourcesOptions) -> None:
     Places and sizes are in pixels from the top left corner, brightness is the sum of plate values.
     """
     from ...plates.marked import light_rows
-    from ...workflow.plate_sources import plate_frames, plate_shot
+    from ...workflow.plates.plate_sources import plate_frames, plate_shot
     from ...workflow.shot import parsed_frames
 
     settings = plate_settings(options.plate, options)
@@ -123,7 +123,7 @@ def _marked_pattern(text: str | None, settings: PlateSettings, frames: tuple[int
 
 def _kept(options: SourcesOptions) -> Path | None:
     """Return the file for partial work, beside the output; without one a repeated command starts again."""
-    from ...workflow.plate_sources import sources_file
+    from ...workflow.plates.plate_sources import sources_file
 
     output = options.table or options.marked
     return None if output is None else sources_file(str(output))
@@ -144,7 +144,7 @@ def _write_marked(pattern: Any, found: PlateShot, settings: PlateSettings, frame
     from ...plates.marked import marked_plate
     from ...plates.measured_plate import converted
     from ...render.image.display import srgb_oetf
-    from ...workflow.plate_sources import plate_picture
+    from ...workflow.plates.plate_sources import plate_picture
 
     for frame in frames:
         linear = converted(plate_picture(settings, frame), "rec709")

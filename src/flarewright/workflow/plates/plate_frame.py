@@ -7,16 +7,16 @@ from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
-from ..errors import ProjectError
-from ..io.images.exr import write_exr
-from ..jobs.frame_list import FramePattern
-from ..measure.replay.measured_project import is_measured
-from ..model import Art, Dirt, Layer, Light, Output, Project, Quality, Starburst
-from ..plates.comp import composed, source_mask
-from ..plates.field_map import FieldMap, field_map
-from ..plates.lights import lights_at, plate_factor
-from ..plates.measured_plate import converted, measured_pixels
-from ..render.scene.resolve import resolve_project
+from ...errors import ProjectError
+from ...io.images.exr import write_exr
+from ...jobs.frame_list import FramePattern
+from ...measure.replay.measured_project import is_measured
+from ...model import Art, Dirt, Layer, Light, Output, Project, Quality, Starburst
+from ...plates.comp import composed, source_mask
+from ...plates.field_map import FieldMap, field_map
+from ...plates.lights import lights_at, plate_factor
+from ...plates.measured_plate import converted, measured_pixels
+from ...render.scene.resolve import resolve_project
 from .plate_sources import PlateShot, plate_matte, plate_picture
 
 __all__ = [

@@ -16,22 +16,22 @@ from pathlib import Path
 
 import numpy as np
 
-from .._version import __version__
-from ..errors import FileError, FlarewrightError, ProjectError
-from ..io.files.atomic_write import write_atomically
-from ..io.files.door import outside_arrays
-from ..io.files.text_file import digest_of
-from ..io.images.plate_image import read_matte
-from ..io.images.plate_picture import PlatePicture, Transfer, read_plate
-from ..jobs.frame_list import FramePattern, frames_text
-from ..jobs.processes import shares, work_off
-from ..plates.detection import LUMINANCE, Sources, find_sources, mean_luminance
-from ..plates.joining import joined
-from ..plates.lights import PlateTracks, plate_tracks
-from ..plates.measured_plate import measured_pixels
-from ..plates.settings import PlateSettings
-from ..plates.tracking import TrackingSettings, follow, steady
-from ..typing import Floats, Pixels
+from ..._version import __version__
+from ...errors import FileError, FlarewrightError, ProjectError
+from ...io.files.atomic_write import write_atomically
+from ...io.files.door import outside_arrays
+from ...io.files.text_file import digest_of
+from ...io.images.plate_image import read_matte
+from ...io.images.plate_picture import PlatePicture, Transfer, read_plate
+from ...jobs.frame_list import FramePattern, frames_text
+from ...jobs.processes import shares, work_off
+from ...plates.detection import LUMINANCE, Sources, find_sources, mean_luminance
+from ...plates.joining import joined
+from ...plates.lights import PlateTracks, plate_tracks
+from ...plates.measured_plate import measured_pixels
+from ...plates.settings import PlateSettings
+from ...plates.tracking import TrackingSettings, follow, steady
+from ...typing import Floats, Pixels
 
 __all__ = ["PlateShot", "plate_frames", "plate_picture", "plate_shot", "sources_file", "sources_of_frame"]
 
@@ -45,7 +45,7 @@ _FRAMES_A_PROCESS = 6
 _MOST_VALUES = 2e8
 # seconds between two writes of the partial result
 _SAVE_S = 10.0
-_FIND = "flarewright.workflow.plate_sources:sources_of_frame"
+_FIND = "flarewright.workflow.plates.plate_sources:sources_of_frame"
 
 
 @dataclass(frozen=True)
