@@ -284,7 +284,7 @@ def _draft(
     meter: _ProgressMeter,
 ) -> GhostPass:
     points, wide = ([s for s in shots if (s.border is None) == point] for point in (True, False))
-    order = list(range(len(paths))) if singles == 0 else _rank_draft(shots, paths, art)
+    order = _rank_draft(shots, paths, art) if singles != 0 and paths else list(range(len(paths)))
     alone = set(order if singles is None else order[:singles])
     changes = [art.get(path.name, PLAIN) for path in paths]
     # paths with only a colour gain are drawn with the unchanged ones
