@@ -11,8 +11,8 @@ from flarewright.editor.session.reach import Reach, files_of
 from flarewright.io.lens.lens_writer import write_lens
 from flarewright.model import Project
 from flarewright.render.scene.resolve import open_lens
-from flarewright.workflow.library_addition import add_lenses
-from flarewright.workflow.own_thumbnails import missing_thumbnails, read_thumbnail
+from flarewright.workflow.own_library.addition import add_lenses
+from flarewright.workflow.own_library.thumbnails import missing_thumbnails, read_thumbnail
 
 
 @pytest.fixture

@@ -9,10 +9,7 @@ The command line and other front ends call these functions; nothing here prints.
 - `lens_flares`: `lens_flares`, `scene_flare` and `camera_project` build the flares that a prediction needs
 - `ghost_sweep`: `sweep_ghosts` analyses ghosts over fields, wavelengths and f-numbers, `surface_gains` ranks surfaces
 - `lens_export`: `export_lens` writes a lens in the formats of other programs
-- `own_lenses`: `own_library`, records of the user's lenses; `remove_lens`
-- `lens_record`: `record_of` and `shipped_records`, what a library knows of a lens
-- `library_addition`: `add_lenses` adds the lens files of folders and archives to the user's library
-- `own_thumbnails`: `make_thumbnails` renders thumbnails of the user's lenses
+- `own_library`: the user's library of lenses: `add_lenses`, `own_library`, `remove_lens`, `make_thumbnails`
 - `measured_flares`: `model_flares` builds them from a measured model
 - `measured_camera`: `model_in_scene` does so for a camera of a scene; `model_errors` finds its errors
 - `project_files`: `open_project_files` opens all files of a project and collects the errors

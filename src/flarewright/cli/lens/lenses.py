@@ -18,7 +18,7 @@ def lenses(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON 
     from ...io.lens.toml_lens import read_lens_toml
     from ...optics.rays.pack import preset_names
     from ...render.scene.resolve import first_order
-    from ...workflow.own_lenses import own_library
+    from ...workflow.own_library.own_lenses import own_library
 
     found: list[dict[str, Any]] = []
     for name in library_names():

@@ -44,7 +44,7 @@ def add(
     are no usable lens are listed with the reason. Exit code 2 if there was no usable lens at all.
     """
     from ...io.files.door import expanded
-    from ...workflow.library_addition import add_lenses
+    from ...workflow.own_library.addition import add_lenses
 
     reading, column = aperture_reading(apertures), first_column_reading(first_column)
     with one_bar("library") as bar:

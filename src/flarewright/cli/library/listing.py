@@ -16,7 +16,7 @@ def listing(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON
     """List the lenses of your library with focal length, f-number, field, maker and patent."""
     from ...io.lens.own.folder import library_folder
     from ...io.lens.own.record import as_json as record_json
-    from ...workflow.own_lenses import own_library
+    from ...workflow.own_library.own_lenses import own_library
 
     with one_bar("library") as bar:
         library = own_library(bar)

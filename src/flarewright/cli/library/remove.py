@@ -15,7 +15,7 @@ def remove(
     names: Annotated[list[str], typer.Argument(metavar="NAME...", help="Lenses of your library.")],
 ) -> None:
     """Remove lenses from your library."""
-    from ...workflow.own_lenses import find_own, remove_lens
+    from ...workflow.own_library.own_lenses import find_own, remove_lens
 
     # a name that is wrong is reported before anything is removed
     found = list(dict.fromkeys(find_own(name)[0] for name in names))

@@ -36,7 +36,7 @@ def search(
     """
     from ...io.lens.own.record import as_json as record_json
     from ...io.lens.own.search import Query, matching, parse_range
-    from ...workflow.own_lenses import own_library
+    from ...workflow.own_library.own_lenses import own_library
 
     def limits(text: str | None, flag: str) -> tuple[float, float] | None:
         return None if text is None else parse_range(text, flag)
@@ -50,7 +50,7 @@ def search(
     mine = matching(library.records, query)
     shipped = []
     if not own:
-        from ...workflow.lens_record import shipped_records
+        from ...workflow.own_library.lens_record import shipped_records
 
         shipped = matching(shipped_records(), query)
     names = frozenset(record.name for record in shipped)

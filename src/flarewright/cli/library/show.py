@@ -17,7 +17,7 @@ def show(
 ) -> None:
     """Show where a lens of your library came from, what its reader repaired, and where its file is."""
     from ...io.lens.own.record import as_json as record_json
-    from ...workflow.own_lenses import find_own, own_library
+    from ...workflow.own_library.own_lenses import find_own, own_library
 
     own_name, path = find_own(name)
     library = own_library()

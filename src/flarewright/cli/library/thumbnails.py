@@ -17,8 +17,8 @@ def thumbnails(
     ] = None,
 ) -> None:
     """Render the missing thumbnails of your library as drafts; an interrupted command resumes."""
-    from ...workflow.own_lenses import find_own
-    from ...workflow.own_thumbnails import make_thumbnails
+    from ...workflow.own_library.own_lenses import find_own
+    from ...workflow.own_library.thumbnails import make_thumbnails
 
     with one_bar("thumbnails") as bar:
         made, failed = make_thumbnails(bar, [find_own(name)[0] for name in names] if names else None)

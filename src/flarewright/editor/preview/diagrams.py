@@ -27,8 +27,8 @@ from ...render.plots.coating_plot import PANEL, PLOT_ANGLES_DEG, STRIP_ANGLES_DE
 from ...render.plots.cross_section import cross_section
 from ...render.plots.svg import to_svg
 from ...render.scene.resolve import open_lens, resolve_project
-from ...workflow.lens_record import shipped_records
-from ...workflow.own_lenses import own_library
+from ...workflow.own_library.lens_record import shipped_records
+from ...workflow.own_library.own_lenses import own_library
 from .display_image import png
 
 

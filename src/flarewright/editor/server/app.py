@@ -33,7 +33,7 @@ from ...errors import FlarewrightError, ProjectError
 from ...io.images.thumbnails import thumbnail
 from ...io.lens.library import is_own
 from ...model import Project
-from ...workflow.own_thumbnails import read_thumbnail
+from ...workflow.own_library.thumbnails import read_thumbnail
 from ..commands.light_path import go_to
 from ..commands.shot import move_light
 from ..preview import diagrams, queries

@@ -16,10 +16,10 @@ from flarewright.io.lens.library import is_own, lens_path, library_name, near_na
 from flarewright.io.lens.own.folder import lenses_folder, library_folder, own_lenses
 from flarewright.io.lens.own.index import index_path
 from flarewright.render.scene.resolve import open_lens
-from flarewright.workflow import own_lenses as lists
 from flarewright.workflow.lens_export import export_lens
-from flarewright.workflow.library_addition import add_lenses
-from flarewright.workflow.own_lenses import own_library, remove_lens
+from flarewright.workflow.own_library import own_lenses as lists
+from flarewright.workflow.own_library.addition import add_lenses
+from flarewright.workflow.own_library.own_lenses import own_library, remove_lens
 
 SHIPPED = ("tessar-brendel", "triplet-pestrecov", "petzval-kodak")
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from ..io.lens.library import library_names
-from ..io.lens.own.facts import maker_of, patent_of
-from ..io.lens.own.record import LONGEST_REMARKS, LensRecord
-from ..model import Surface
-from ..optics.lens.zoom import at_position
-from ..render.scene.resolve import OpenedLens, first_order, open_lens
+from ...io.lens.library import library_names
+from ...io.lens.own.facts import maker_of, patent_of
+from ...io.lens.own.record import LONGEST_REMARKS, LensRecord
+from ...model import Surface
+from ...optics.lens.zoom import at_position
+from ...render.scene.resolve import OpenedLens, first_order, open_lens
 
 _LONGEST_TEXT = 600
 

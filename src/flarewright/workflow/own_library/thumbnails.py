@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ..errors import FileError, FlarewrightError, OutputError
-from ..io.files.atomic_write import write_atomically
-from ..io.files.door import sentences_for
-from ..io.files.text_file import read_bytes
-from ..io.images.thumbnails import SIZE_PX
-from ..io.lens.library import lens_path, library_names
-from ..io.lens.own.folder import key_of, own_lenses, thumbnail_file, writable_folder
-from ..render.gallery import card_project, lens_card
-from ..render.image.display import layers_exposure, view
-from ..render.render import render
-from ..typing import Progress
+from ...errors import FileError, FlarewrightError, OutputError
+from ...io.files.atomic_write import write_atomically
+from ...io.files.door import sentences_for
+from ...io.files.text_file import read_bytes
+from ...io.images.thumbnails import SIZE_PX
+from ...io.lens.library import lens_path, library_names
+from ...io.lens.own.folder import key_of, own_lenses, thumbnail_file, writable_folder
+from ...render.gallery import card_project, lens_card
+from ...render.image.display import layers_exposure, view
+from ...render.render import render
+from ...typing import Progress
 
 _QUALITY = 85
 _GREY = 72

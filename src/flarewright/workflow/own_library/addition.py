@@ -12,16 +12,16 @@ from pathlib import Path
 from shutil import copyfile
 from typing import IO
 
-from ..errors import FlarewrightError, LensError, OutputError, ProjectError
-from ..io.files.atomic_write import write_atomically
-from ..io.files.door import sentences_for, shown
-from ..io.files.text_file import digest_of
-from ..io.images.mask_image import read_mask
-from ..io.lens.formats.codev import FirstColumn
-from ..io.lens.lens_writer import format_lens
-from ..io.lens.library import library_names
-from ..io.lens.own.archive import LensFile, lens_files
-from ..io.lens.own.folder import (
+from ...errors import FlarewrightError, LensError, OutputError, ProjectError
+from ...io.files.atomic_write import write_atomically
+from ...io.files.door import sentences_for, shown
+from ...io.files.text_file import digest_of
+from ...io.images.mask_image import read_mask
+from ...io.lens.formats.codev import FirstColumn
+from ...io.lens.lens_writer import format_lens
+from ...io.lens.library import library_names
+from ...io.lens.own.archive import LensFile, lens_files
+from ...io.lens.own.folder import (
     key_of,
     lenses_folder,
     library_folder,
@@ -30,13 +30,13 @@ from ..io.lens.own.folder import (
     unused_name,
     writable_folder,
 )
-from ..io.lens.own.index import Entry, read_index
-from ..io.lens.own.record import LensRecord, with_record
-from ..io.lens.toml_lens import lens_from_table
-from ..model import Lens, Surface
-from ..optics.lens_import.patent_repair import Apertures
-from ..render.scene.resolve import open_lens
-from ..typing import Progress
+from ...io.lens.own.index import Entry, read_index
+from ...io.lens.own.record import LensRecord, with_record
+from ...io.lens.toml_lens import lens_from_table
+from ...model import Lens, Surface
+from ...optics.lens_import.patent_repair import Apertures
+from ...render.scene.resolve import open_lens
+from ...typing import Progress
 from .lens_record import record_of
 from .own_lenses import kept_record, library_lock, own_library
 

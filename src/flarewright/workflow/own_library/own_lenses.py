@@ -10,15 +10,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO
 
-from ..errors import FlarewrightError, LensError, OutputError
-from ..io.files.door import sentences_for, shown
-from ..io.files.file_lock import locked
-from ..io.files.text_file import read_text
-from ..io.lens.library import library_names
-from ..io.lens.own.folder import key_of, library_folder, own_lenses, spoken, writable_folder
-from ..io.lens.own.index import Entry, read_index, write_index
-from ..io.lens.own.record import LensRecord, record_in
-from ..typing import Progress, Report
+from ...errors import FlarewrightError, LensError, OutputError
+from ...io.files.door import sentences_for, shown
+from ...io.files.file_lock import locked
+from ...io.files.text_file import read_text
+from ...io.lens.library import library_names
+from ...io.lens.own.folder import key_of, library_folder, own_lenses, spoken, writable_folder
+from ...io.lens.own.index import Entry, read_index, write_index
+from ...io.lens.own.record import LensRecord, record_in
+from ...typing import Progress, Report
 
 _PICTURE = re.compile(r"\.\./images/([0-9a-f]{16}(?:\.\w{1,8})?)(?=\")")
 
@@ -85,7 +85,7 @@ def own_library(progress: Progress | None = None) -> Library:
 def _made_again(name: str, path: Path) -> LensRecord:
     """Make the record of a lens file that was edited or put into the folder by hand."""
     # most lists need no lens, and what opens one takes longer to import than an index to read
-    from ..render.scene.resolve import open_lens
+    from ...render.scene.resolve import open_lens
     from .lens_record import record_of
 
     before, _ = record_in(read_text(path, "a lens file"), name)
