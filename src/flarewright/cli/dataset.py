@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -14,6 +13,7 @@ import typer
 
 from ..errors import ProjectError
 from .common import check_place, first_run_bar, print_json, print_remarks, progress_bar
+from .progress_lines import ProgressLines
 
 if TYPE_CHECKING:
     from ..model import Project
@@ -179,21 +179,7 @@ def _progress() -> Iterator[Callable[[ItemResult, int, int], None]]:
             bar = begin("dataset")
             yield lambda result, done, of: bar(done / of, f"item {result.index}, {done} of {of}")
         return
-    started = time.monotonic()
-    # the first item also waits for kernels and processes, and kept ones take no time: neither predicts the others
-    first_s, later = 0.0, -1
-
-    def line(result: ItemResult, done: int, of: int) -> None:
-        nonlocal first_s, later
-        seconds = time.monotonic() - started
-        later += result.drawn
-        first_s = seconds if later == 0 and result.drawn else first_s
-        left_s = round((seconds - first_s) / later * (of - done), 3) if later > 0 else None
-        state = "drawn" if result.drawn else "kept"
-        data = {
-            "item": result.index, "split": result.split, "state": state, "done": done, "of": of,
-            "seconds": round(seconds, 3), "left_s": left_s,
-        }  # fmt: skip
-        print(json.dumps(data), file=sys.stderr, flush=True)
-
-    yield line
+    lines = ProgressLines()
+    yield lambda result, done, of: lines.finished(
+        {"item": result.index, "split": result.split}, drawn=result.drawn, done=done, of=of
+    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from ...errors import ProjectError
 from ..common import first_run_bar, print_json, print_remarks, progress_bar
 from ..option_record import with_options
+from ..progress_lines import ProgressLines, print_line
 from .command import keep_inputs, project_of_options
 from .options.record import RenderOptions
 from .options.shot import ShotOptions
@@ -216,29 +216,17 @@ def _progress() -> Iterator[tuple[_Report, _Searched]]:
                 lambda frame, done, of: show("finding lights", done, of, f"frame {frame}, {done} of {of}"),
             )
         return
-    started = time.monotonic()
-    # the first frame also waits for kernels and processes, and kept ones take no time: neither predicts the others
-    first_s, later = 0.0, -1
-
-    def line(result: FrameResult, done: int, of: int) -> None:
-        nonlocal first_s, later
-        seconds = time.monotonic() - started
-        later += result.drawn
-        first_s = seconds if later == 0 and result.drawn else first_s
-        left_s = round((seconds - first_s) / later * (of - done), 3) if later > 0 else None
-        state = "drawn" if result.drawn else "kept"
-        data = {
-            "frame": result.frame, "file": result.file, "state": state, "done": done, "of": of,
-            "seconds": round(seconds, 3), "left_s": left_s,
-        }  # fmt: skip
-        print(json.dumps(data), file=sys.stderr, flush=True)
+    lines = ProgressLines()
 
     def search_line(frame: int, done: int, of: int) -> None:
-        nonlocal started
-        data = {"frame": frame, "state": "searched", "done": done, "of": of}
-        print(json.dumps(data), file=sys.stderr, flush=True)
+        print_line({"frame": frame, "state": "searched", "done": done, "of": of})
         if done == of:
             # the estimate is that of the drawing
-            started = time.monotonic()
+            lines.restart()
 
-    yield line, search_line
+    yield (
+        lambda result, done, of: lines.finished(
+            {"frame": result.frame, "file": result.file}, drawn=result.drawn, done=done, of=of
+        ),
+        search_line,
+    )
