@@ -350,7 +350,7 @@ def test_draft_says_that_it_has_no_rings():
     ("iris", "size", "most", "of_rings"),
     [
         (Iris(blades=8, rotation_deg=10.0), 400, 4e-3, 0.08),
-        pytest.param(Iris(blades=5, rounding=0.6), 400, 4e-3, 0.08, marks=pytest.mark.slow),
+        (Iris(blades=5, rounding=0.6), 400, 4e-3, 0.08),
         pytest.param(Iris(), 400, 4e-3, 0.08, marks=pytest.mark.slow),
         # pixels as wide as fringes: the transform is only as fine as they can show
         (Iris(blades=8, rotation_deg=10.0), 100, 8e-3, 0.22),
