@@ -5,7 +5,9 @@ import json
 import pytest
 
 from flarewright.cli.app import run
+from flarewright.cli.library.tables import print_records
 from flarewright.io.lens.lens_writer import write_lens
+from flarewright.io.lens.own.record import LensRecord
 from flarewright.render.scene.resolve import open_lens
 
 
@@ -65,6 +67,18 @@ def test_tables_for_people_name_every_lens(folder, capsys):
     assert "triplet-pestrecov *" in answer(capsys, "library search pestrecov")[0]
     assert "sha256: " in answer(capsys, "library show old-triplet-pestrecov")[0]
     assert "no lens matches" in answer(capsys, "library search summicron")[1]
+
+
+def test_a_long_name_leaves_the_numbers_whole(capsys):
+    record = LensRecord(
+        name="panasonic-leica-dg-vario-elmar-100-400mm-f4.0-6.3-asph", title="Vario-Elmar", maker="Konica Minolta",
+        patent="US 2018/0284478", efl_mm=103.0, efl_range_mm=(103.0, 388.0), f_number=4.13, field_deg=6.0, surfaces=41,
+    )  # fmt: skip
+    print_records([record])
+    lines = capsys.readouterr().out.splitlines()
+    row = next(line for line in lines if record.name in line)
+    told = (record.name, "103.0-388.0", "4.13", "6.0", "41", record.maker, record.patent, record.title)
+    assert tuple(cell.strip() for cell in row.strip("\u2502").split("\u2502")) == told
 
 
 @pytest.mark.parametrize(

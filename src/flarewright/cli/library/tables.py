@@ -12,10 +12,12 @@ if TYPE_CHECKING:
 
 
 _TITLE_WIDTH = 32
+# no table is wider: the longest names, makers and patents beside a title of that width
+_WIDEST = 400
 
 
 def print_records(records: Sequence[LensRecord], shipped: frozenset[str] = frozenset()) -> None:
-    """Print records as a table.
+    """Print records as a table, in a file or pipe with one line a lens.
 
     Parameters
     ----------
@@ -26,12 +28,15 @@ def print_records(records: Sequence[LensRecord], shipped: frozenset[str] = froze
     from rich.table import Table
 
     out = Table(caption="Field: half angle in degrees." + ("  * shipped with Flarewright." if shipped else ""))
-    out.add_column("name", no_wrap=True)
+    terminal = console()
+    # on a narrow terminal the texts wrap, so that the numbers stay whole
+    lines = not terminal.is_terminal
+    out.add_column("name", no_wrap=lines, overflow="fold")
     for column in ("efl mm", "f/", "field", "surfaces"):
         out.add_column(column, justify="right", no_wrap=True)
-    out.add_column("maker", no_wrap=True)
-    out.add_column("patent", no_wrap=True)
-    out.add_column("title", overflow="ellipsis", no_wrap=True, max_width=_TITLE_WIDTH)
+    out.add_column("maker", no_wrap=lines)
+    out.add_column("patent", no_wrap=lines)
+    out.add_column("title", overflow="ellipsis", no_wrap=lines, max_width=_TITLE_WIDTH)
     for record in records:
         out.add_row(
             f"{record.name} *" if record.name in shipped else record.name,
@@ -43,4 +48,7 @@ def print_records(records: Sequence[LensRecord], shipped: frozenset[str] = froze
             record.patent or "-",
             record.title,
         )
-    console().print(out)
+    if lines:
+        needed = terminal.measure(out, options=terminal.options.update(max_width=_WIDEST)).maximum
+        terminal.width = max(terminal.width, needed)
+    terminal.print(out)
