@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from flarewright.errors import ProjectError
+from flarewright.io.lens.lens_writer import write_lens
 from flarewright.model.project.dataset import DatasetSpec
 from flarewright.model.project.distribution import Choice, Integers, LogUniform, Normal, TextChoice, Uniform
+from flarewright.render.scene.resolve import open_lens
 from flarewright.workflow.training_pairs.draw import (
     check_lenses,
     draw_item,
@@ -71,6 +73,15 @@ def test_items_in_sequence_share_an_iris():
     spec = spec_of(iris={"rounding": {"uniform": [0, 1]}, "repeat": 3}, lens={"names": "heliar-tronnier"})
     irises = [draw_item(spec, index).project.iris for index in range(6)]
     assert irises[0] == irises[2] != irises[3] == irises[5]
+
+
+def test_the_iris_of_a_lens_file_keeps_its_shape(tmp_path):
+    lens = open_lens("heliar-tronnier").lens
+    write_lens(lens.replace(iris=lens.iris.replace(blades=6, rounding=0.5)), tmp_path / "own.toml")
+    names = {"names": str(tmp_path / "own.toml")}
+    kept, other = (draw_item(spec_of(lens=names, iris=iris), 0).project.iris for iris in ({}, {"rounding": 0.2}))
+    assert (kept.blades, kept.rounding) == (6, 0.5)
+    assert (other.blades, other.rounding) == (6, 0.2)
 
 
 def test_a_lens_opens_no_wider_than_it_can_and_a_zoom_stays_in_its_range():

@@ -70,15 +70,15 @@ class IrisDraws(Frozen):
     ----------
     blades : Distribution or None
         0 is round, else 3 to 24; None: the lens file's.
-    rounding : Distribution
-        0 straight edges, 1 a circle.
+    rounding : Distribution or None
+        0 straight edges, 1 a circle; None: the lens file's.
     rotation_deg : Distribution
     repeat : int
         Items in sequence that share an iris. Its diffraction pattern takes longer than all else of a draft.
     """
 
     blades: Annotated[Distribution, AfterValidator(within(0.0, 24.0, whole=True))] | None = None
-    rounding: Annotated[Distribution, AfterValidator(within(0.0, 1.0))] = Constant(constant=0.0)
+    rounding: Annotated[Distribution, AfterValidator(within(0.0, 1.0))] | None = None
     rotation_deg: Annotated[Distribution, AfterValidator(within(-360.0, 360.0))] = Uniform(uniform=(0.0, 360.0))
     repeat: int = Field(25, ge=1, le=1_000_000)
 

@@ -213,7 +213,7 @@ def _iris(spec: DatasetSpec, index: int, name: str) -> Iris:
     own = open_lens(name).lens.iris
     found: Iris = own.replace(
         **({} if blades is None else {"blades": blades, "mask": None}),
-        rounding=draw_number(draws.rounding, rng),
+        **({} if draws.rounding is None else {"rounding": draw_number(draws.rounding, rng)}),
         rotation_deg=draw_number(draws.rotation_deg, rng),
     )
     return found
