@@ -266,6 +266,15 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
         nuke_script(str(tmp_path / "a.exr"))
 
 
+def test_frames_of_another_scale_are_refused(shot, tmp_path):
+    # as `render` writes a frame with a brighter light
+    beauty = Layer("beauty", np.ones((SIZE[1], SIZE[0], 3), np.float32), (0, 0, *SIZE), {})
+    write_exr(tmp_path / "flare.1004.exr", [beauty], SIZE, scale=2.0**-7)
+    with pytest.raises(ProjectError, match=r"flare\.1004\.exr holds .* times 0\.0078125, .*1001\.exr times 1024"):
+        nuke_script(shot)
+    assert nuke_script(shot, frames=(1001, 1002)).frames == (1001, 1002)
+
+
 def test_the_command_writes_once(shot, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert run(["nuke-script", "flare.####.exr", "-o", "a.nk"]) == 0

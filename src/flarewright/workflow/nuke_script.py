@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import OutputError, ProjectError
 from ..io.files.door import shown
-from ..io.images.exr import ExrContents, read_exr
+from ..io.images.exr import ExrContents, read_exr, scale_in_exr
 from ..jobs.frame_list import FramePattern, frames_text
 from .nuke_graph import Node, Passes, flare_nodes, layers_text, nodes_text, quoted
 
@@ -102,7 +102,7 @@ def nuke_script(
     Raises
     ------
     ProjectError
-        There are no files, or the first of the chosen frames does not exist.
+        There are no files, the first of the chosen frames does not exist, or frames have different scales.
     OutputError
         A file is no EXR of Flarewright's.
 
@@ -118,6 +118,7 @@ def nuke_script(
         raise ProjectError(f"the gain {gain:g} is no factor above 0")
     files = _sequence(flare, frames)
     contents = read_exr(FramePattern(flare).path(files.first))
+    _check_scales(FramePattern(flare), files, contents.scale)
     found, remarks = _passes(contents, singles)
     if files.missing:
         remarks.append(f"{flare} has no frames {frames_text(files.missing)[:200]}; Nuke reports an error there")
@@ -175,6 +176,21 @@ def _sequence(text: str, frames: Sequence[int] | None) -> Frames:
     # the width of the number as Nuke writes it
     width = next((n for n in range(1, 10) if pattern.path(1) == FramePattern(_hashes(text, n)).path(1)), 1)
     return Frames(_absolute(Path(_hashes(text, width))), first, last, missing)
+
+
+def _check_scales(pattern: FramePattern, files: Frames, scale: float) -> None:
+    """Raise an error for a frame whose values have another factor than the first frame's, which the script divides out.
+
+    `render` chooses the factor by the lights of one picture, `shot` by those of all frames.
+    """
+    first = pattern.path(files.first)
+    for frame in range(files.first + 1, files.last + 1) if pattern.numbered else ():
+        path = pattern.path(frame)
+        if path.exists() and (other := scale_in_exr(path)) != scale:
+            raise ProjectError(
+                f"{shown(path)} holds irradiances times {other:g}, {shown(first)} times {scale:g}: draw all frames "
+                "with flarewright shot, or with --float"
+            )
 
 
 _NUMBER = re.compile(r"#+|%(?:0\d{1,2})?d|\$F\d?")

@@ -496,6 +496,31 @@ def exr_size(path: str | PathLike[str]) -> tuple[int, int]:
     return int(high[0] - low[0]) + 1, int(high[1] - low[1]) + 1
 
 
+def scale_in_exr(path: str | PathLike[str]) -> float:
+    """Return the factor of the values in a file without reading its pixels; 1 in files of other programs.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    OutputError
+        When it is not a readable EXR file.
+    """
+    import OpenEXR
+
+    try:
+        with outside(path, "an EXR file", remedy="give an EXR file"):
+            return _scale(OpenEXR.File(str(path), header_only=True).parts[0])
+    except FileError as error:
+        raise OutputError(str(error)) from error
+
+
 def _prefixed(header: Mapping[str, Any], prefix: str) -> dict[str, Any]:
     return {name.removeprefix(prefix): value for name, value in header.items() if name.startswith(prefix)}
 
