@@ -91,6 +91,19 @@ def test_an_archive_adds_the_lenses_of_its_folder(files, state, tmp_path):
         "Zeiss Tessar.zmx", "Triplet.csv", "Petzval.lens", "zoom/Canon EF 70-200.zmx"
     )}  # fmt: skip
     assert all(one.file in one.reason for one in packed.refused)
+    # not the name under which it was unpacked
+    made = next(one for one in packed.added if one.name == "zeiss-tessar")
+    assert "from Zeiss Tessar.zmx" in made.source + made.notes
+    assert "lens.zmx" not in own_lenses()["zeiss-tessar"].read_text() + made.source + made.notes
+
+
+def test_a_name_for_a_lens_that_is_there_has_no_effect_and_says_so(state, tmp_path):
+    file = tmp_path / "mine.toml"
+    write_lens(open_lens("triplet-pestrecov").lens, file)
+    add_lenses([file])
+    found = add_lenses([file], name="other")
+    assert found.known == ((str(file), "mine"),)
+    assert found.remarks == (f"--name has no effect: {file} is in the library, as mine",)
 
 
 def test_the_name_of_a_shipped_lens_stays_its_own(state, tmp_path):

@@ -144,6 +144,8 @@ def add_lenses(
                     digest = sha256(data).hexdigest()
                     if (there := names.name_of(digest)) is not None:
                         known.append((file.label, there))
+                        if name is not None:
+                            remarks.append(f"--name has no effect: {file.label} is in the library, as {there}")
                         continue
                     text, record = _read(file, data, digest, reading)
                     made, said = names.put(text, record, name or file.stem, exact=name is not None)
@@ -194,6 +196,13 @@ def _read(file: LensFile, data: bytes, digest: str, reading: _Reading) -> tuple[
         if lens.name == path.stem != file.stem:
             # a file without a title: the reader has taken the name of the unpacked file
             lens, record = lens.replace(name=file.stem), replace(record, title=file.stem)
+        if path.stem != file.stem:
+            # readers have written the name of the unpacked file
+            unpacked, own = f"from {path.name}", f"from {file.stem}{file.suffix}"
+            source, notes = (text.replace(unpacked, own, 1) for text in (lens.source, lens.notes))
+            lens = lens.replace(source=source, notes=notes)
+            source, notes = (text.replace(unpacked, own, 1) for text in (record.source, record.notes))
+            record = replace(record, source=source, notes=notes)
     text = format_lens(lens)
     # what every command will read has to be readable
     lens_from_table(tomllib.loads(text), f"{file.label} in Flarewright's format", folder=lenses_folder())
