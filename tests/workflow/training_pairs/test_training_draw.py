@@ -119,3 +119,10 @@ def test_splits_share_out_lenses_and_every_split_has_one():
 def test_a_lens_that_cannot_be_used_is_named_before_the_work():
     with pytest.raises(ProjectError, match=r"lens.names: heliar-tronnier: .*preset"):
         check_lenses(spec_of(lens={"names": "heliar-tronnier", "coating": "preset:gold"}))
+
+
+def test_stops_that_lead_beyond_the_largest_f_number_are_refused_before_the_work():
+    # heliar-tronnier opens to f/3.5
+    check_lenses(spec_of(lens={"names": "heliar-tronnier", "stops_down": {"uniform": [0, 12.3]}}))
+    with pytest.raises(ProjectError, match=r"heliar-tronnier: lens.stops_down of 13 from f/3.5 .* give at most 12.3"):
+        check_lenses(spec_of(lens={"names": "heliar-tronnier", "stops_down": [0, 13]}))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import pi
+from math import floor, log2, pi
 
 import numpy as np
 
 from ...errors import FlarewrightError, ProjectError
 from ...io.lens.coating_text import parse_coating_choice
 from ...model import BlackBody, Camera, Dirt, Iris, Lens, Light, Output, Project, Quality, Scatter
+from ...model.lens.prescription import LARGEST_F_NUMBER
 from ...model.project.dataset import DatasetSpec, InField, LensDraws
 from ...model.project.distribution import (
     AnyDistribution,
@@ -289,7 +290,8 @@ def check_lenses(spec: DatasetSpec) -> None:
     Raises
     ------
     FlarewrightError
-        A lens cannot be read, has no such coating, or cannot be focused; the sentence names it.
+        A lens cannot be read, has no such coating, cannot be focused, or cannot be stopped down so far; the sentence
+        names it.
     """
     for name in spec.lens.names.choice:
         lens = open_lens(name).lens
@@ -305,10 +307,21 @@ def check_lenses(spec: DatasetSpec) -> None:
                             camera=Camera(focus_distance=distance),
                         )
                     )  # fmt: skip
+                    _check_stops(spec.lens, settled.lens.f_number)
             for text in coatings:
                 _check_coating(settled.lens, text)
         except FlarewrightError as error:
             raise ProjectError(f"lens.names: {name}: {error}", error.problems) from None
+
+
+def _check_stops(draws: LensDraws, widest: float) -> None:
+    """Raise an error for stops that lead beyond the largest f-number."""
+    most = draws.stops_down.support[1]
+    if draws.f_number is None and widest * 2.0 ** (0.5 * most) > LARGEST_F_NUMBER:
+        raise ProjectError(
+            f"lens.stops_down of {most:g} from f/{widest:.3g} leads beyond f/{LARGEST_F_NUMBER:g}: give at most "
+            f"{floor(20.0 * log2(LARGEST_F_NUMBER / widest)) / 10.0:g}"
+        )
 
 
 def _check_coating(lens: Lens, text: str) -> None:
