@@ -23,6 +23,7 @@ from flarewright.io.files.door import (
     outside,
     outside_arrays,
     read_limit_bytes,
+    reason_of,
     sentences_for,
     shown,
 )
@@ -252,3 +253,11 @@ def test_quoted_input_is_cut():
         lens_path("y z " * 50)
     assert len(str(raised.value)) < 250
     assert str(FlarewrightError("the file's row isn't " + "long " * 50 + "lens's")).count("long") == 50
+
+
+def test_a_reason_names_no_object_of_python(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text("name = 1\n")
+    with path.open("rb") as file:
+        said = reason_of(ValueError(f"cannot identify image file {file!r}"))
+    assert said == "cannot identify image file"

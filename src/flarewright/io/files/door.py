@@ -8,6 +8,7 @@ the block becomes one sentence. `tests/contracts/test_one_door.py` finds readers
 from __future__ import annotations
 
 import os
+import re
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -28,6 +29,7 @@ QUOTED = 120
 _MOST_PACKED, _ALWAYS_BYTES = 100, 64_000_000
 _EXR, _NPY, _ZIP = b"v/1\x01", b"\x93NUMPY", b"PK"
 _LONGEST_NAME = 255
+_OPEN_FILE = re.compile(r" ?<_io\..*>")
 # largest header of a picture or array that is parsed, bytes
 _HEADER = 4_000_000
 _EXR_SAMPLE = {0: 4, 1: 2, 2: 4}
@@ -129,7 +131,8 @@ def reason_of(error: BaseException) -> str:
         return "there is not enough memory"
     text = error.args[0] if error.args else ""
     words = text.decode("ascii", "replace") if isinstance(text, bytes) else str(text)
-    line = " ".join(words.split())[:QUOTED].rstrip(".:")
+    # Pillow names the open file as Python shows it
+    line = " ".join(_OPEN_FILE.sub("", words).split())[:QUOTED].rstrip(".:")
     return line or type(error).__name__
 
 
