@@ -68,6 +68,9 @@ def test_a_still_gives_a_flare_and_a_comp(capsys, folder):
         ("--most-lights 0", "0 lights are not possible"),
         ("--intensity 3", "--intensity is for a --light, and none is given; --plate-gain changes"),
         ("--over photo.exr --size 32x32", "of another shape"),
+        ("--overscan 10%", "--overscan draws more than the plate shows"),
+        ("--crop 50%", "the cropped picture must be the plate, 64x36 pixels; give --crop 64x36 with the --size"),
+        ("--crop 64x36", "is all of the plate; add the --size of the whole picture"),
         ("--over f.exr", "f.exr would replace f.exr, which the shot reads or writes; rename it"),
     ],
 )

@@ -144,6 +144,7 @@ def _over_plate(options: ShotOptions, plate: PlateSettings) -> tuple[ShotOptions
 
     first = plate_picture(plate, plate_frames(plate, parsed_frames(options.frames), options.start or 1)[0])
     width, height = first.size_px
+    _check_frame(options, first.size_px)
     remarks = []
     placed = options.light or options.light_px or options.sun or options.track
     if not placed and options.project is None:
@@ -163,6 +164,21 @@ def _over_plate(options: ShotOptions, plate: PlateSettings) -> tuple[ShotOptions
             "gives the flare such pixels"
         )
     return options, remarks
+
+
+def _check_frame(options: ShotOptions, size_px: tuple[int, int]) -> None:
+    """Raise an error for a frame that is not the plate's: its lights are placed in the whole picture."""
+    if options.overscan is not None:
+        raise ProjectError("--overscan draws more than the plate shows, so its lights would be shifted; omit it")
+    if options.crop is not None:
+        width, height = size_px
+        if options.crop != f"{width}x{height}":
+            raise ProjectError(
+                f"--crop {options.crop!r}: the cropped picture must be the plate, {width}x{height} pixels; give --crop "
+                f"{width}x{height} with the --size of the whole picture, or omit it"
+            )
+        if options.size is None and options.project is None:
+            raise ProjectError(f"--crop {options.crop!r} is all of the plate; add the --size of the whole picture")
 
 
 def _keep_inputs(options: ShotOptions, project: Project, plate: PlateSettings | None) -> None:
