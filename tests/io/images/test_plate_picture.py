@@ -55,6 +55,19 @@ def test_an_exr_file_states_its_rate_time_shape_and_primaries(tmp_path):
     assert "neither Rec.709 nor ACEScg" in read_plate(path).remarks[0]
 
 
+def test_a_sun_beyond_half_floats_is_bright_and_what_is_no_number_is_black(tmp_path):
+    pixels = PIXELS.astype(np.float16)
+    pixels[2, 3], pixels[4, 5] = np.inf, np.nan
+    OpenEXR.File({}, {"RGB": pixels}).write(str(tmp_path / "p.exr"))
+    tifffile.imwrite(tmp_path / "p.tif", pixels.astype(np.float32), photometric="rgb")
+    for name in ("p.exr", "p.tif"):
+        plate = read_plate(tmp_path / name)
+        assert (plate.pixels[2, 3] == 65504.0).all()
+        assert not plate.pixels[4, 5].any()
+        assert np.array_equal(plate.pixels[:2], pixels[:2].astype(np.float32))
+        assert "2 pixels of the plate are infinite or no number" in plate.remarks[0]
+
+
 def test_display_pictures_are_decoded_and_say_so(tmp_path):
     codes = np.arange(6 * 8 * 3, dtype=np.uint8).reshape(6, 8, 3)
     Image.fromarray(codes).save(tmp_path / "p.png")

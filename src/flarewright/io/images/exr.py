@@ -388,7 +388,7 @@ def read_exr_colour(path: str | PathLike[str], what: str = "an EXR file") -> Pix
 
 
 def read_exr_layer(
-    path: str | PathLike[str], layer: str | None, what: str = "an EXR file"
+    path: str | PathLike[str], layer: str | None, what: str = "an EXR file", *, raw: bool = False
 ) -> tuple[Pixels, dict[str, Any]]:
     """Read the colours of a layer of any EXR file within its display window.
 
@@ -400,6 +400,8 @@ def read_exr_layer(
         None: plain channels R, G and B, or a single channel, or Y (grey).
     what : str
         Expected kind of file, for messages.
+    raw : bool
+        Keep values that are infinite or NaN.
 
     Returns
     -------
@@ -420,7 +422,8 @@ def read_exr_layer(
         planes = [_over_display(part, plane) for plane in values]
         colours = np.stack(planes if len(planes) == 3 else [planes[0]] * 3, axis=-1)
         largest = float(np.finfo(np.float32).max)
-        pixels = np.where(np.abs(colours) <= largest, colours, 0.0).astype(np.float32)
+        with np.errstate(over="ignore"):
+            pixels = (colours if raw else np.where(np.abs(colours) <= largest, colours, 0.0)).astype(np.float32)
         return pixels, {**file.parts[0].header, **part.header}
 
 

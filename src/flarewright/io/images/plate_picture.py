@@ -16,6 +16,7 @@ from ...model.project.camera import Colorspace
 from ...typing import Pixels
 from ..files.door import outside, refuse_claim, shown
 from .exr import CHROMATICITIES, read_exr_layer
+from .half import HALF_MAX
 from .picture import SCREEN, decode_srgb
 
 __all__ = ["PLATE_SUFFIXES", "PlatePicture", "Transfer", "read_plate"]
@@ -118,7 +119,8 @@ def read_plate(
 
 
 def _exr(path: Path, layer: str | None, transfer: Transfer | None) -> PlatePicture:
-    pixels, header = read_exr_layer(path, layer, "a plate")
+    pixels, header = read_exr_layer(path, layer, "a plate", raw=True)
+    pixels, damaged = _finite(pixels)
     kept = {name: header[name] for name in _KEPT if name in header}
     space, remarks = _primaries(header)
     if transfer == "srgb":
@@ -131,8 +133,21 @@ def _exr(path: Path, layer: str | None, transfer: Transfer | None) -> PlatePictu
         float(header.get("pixelAspectRatio", 1.0)),
         _rate(header.get("framesPerSecond")),
         kept,
-        remarks,
+        (*damaged, *remarks),
     )
+
+
+def _finite(pixels: Pixels) -> tuple[Pixels, tuple[str, ...]]:
+    """Return pixels whose infinite values are the largest half float, and those that are no numbers 0; and a remark.
+
+    A sun or a lamp brighter than half floats reach is written as infinite; black would remove it from the plate.
+    """
+    finite = np.isfinite(pixels)
+    if finite.all():
+        return pixels, ()
+    count = int((~finite).any(axis=2).sum())
+    words = f"{count} pixels of the plate are infinite or no number: they count as {HALF_MAX:g}, or 0"
+    return np.nan_to_num(pixels, nan=0.0, posinf=HALF_MAX, neginf=0.0), (words,)
 
 
 def _primaries(header: dict[str, Any]) -> tuple[Colorspace | None, tuple[str, ...]]:
@@ -195,10 +210,11 @@ def _tiff(path: Path, transfer: Transfer | None) -> PlatePicture:
     values = values[..., :3]
     if values.dtype.kind == "u":
         return _decoded((values / np.float32(np.iinfo(values.dtype).max)).astype(np.float32), transfer, ())
-    pixels = np.where(np.isfinite(values), values, 0.0).astype(np.float32)
+    with np.errstate(over="ignore"):
+        pixels, damaged = _finite(values.astype(np.float32))
     if transfer == "srgb":
-        return _decoded(np.clip(pixels, 0.0, 1.0), transfer, ())
-    return PlatePicture(pixels, None, "linear")
+        return _decoded(np.clip(pixels, 0.0, 1.0), transfer, damaged)
+    return PlatePicture(pixels, None, "linear", remarks=damaged)
 
 
 def _decoded(coded: Pixels, transfer: Transfer | None, remarks: tuple[str, ...]) -> PlatePicture:
