@@ -177,6 +177,7 @@ def test_tables_have_intensity_colour_names_and_another_corner(read):
         ("{curve x1 5}", "nuke", "has 1 curves"),
         ("{curve x5 1 x4 1} {curve x1 2}", None, "frames do not rise"),
         ("{curve x1 {parent.a}} {curve x1 2}", None, "has an expression"),
+        ("{curve x1 5 nan 7} {curve x1 5 6 7}", None, "'nan' is no number for a value"),
         ("{" * 100, "nuke", "more than 40 braces"),
         (
             "Adobe After Effects 8.0 Keyframe Data\n\nTransform\tScale\n\tFrame\tX percent\n\t0\t5\n",

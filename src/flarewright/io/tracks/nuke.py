@@ -222,7 +222,7 @@ def _keys(curve: list[Any], where: str) -> tuple[Floats, Floats]:
         head = token[0]
         if head == "x" and len(token) > 1:
             stated = number(token[1:], where, "a frame")
-        elif token.isalpha() or head in "stuv":
+        elif (len(token) == 1 and token.isalpha()) or head in "stuv":
             # interpolation between keys, and slopes at them
             continue
         else:
