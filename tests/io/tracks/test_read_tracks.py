@@ -138,6 +138,16 @@ def test_columns_without_frames_begin_at_the_first_frame(read):
     assert found.remarks == (f"{found.remarks[0].split(' has no')[0]} has no frames: its first line is frame 1001",)
 
 
+def test_columns_with_tabs_say_from_which_corner_they_count(read):
+    found = read("1\t10\t20\n2\t11\t21\n")
+    assert (found.format, found.tracks[0].origin) == ("csv", "top-left")
+    assert "from the top left corner; --track-format nuke-ascii counts from the bottom left" in found.remarks[0]
+    assert not read("1\t10\t20\n", origin="bottom-left").remarks
+    assert not read("frame\tx\ty\n1\t10\t20\n").remarks
+    assert not read("1\t10\t20\n", "csv").remarks
+    assert not read("1,10,20\n").remarks
+
+
 def test_positions_of_a_null_count_in_the_composition(read):
     """The source of a null is 100x100 pixels, whatever the size of the composition."""
     (track,) = read(after_effects("Transform\tPosition", (100.0, 100.0))).tracks

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -99,7 +100,13 @@ def read_tracks(
         case "syntheyes":
             return read_syntheyes(text, name)
         case "csv":
-            return read_table(text, name, origin or "top-left")
+            table = read_table(text, name, origin or "top-left")
+            if form is None and origin is None and is_columns(text) and "frame" not in text.lower():
+                # numbers with tabs are also what Nuke exports
+                words = f"{shown(path)} has no names of columns: read as frame, x, y from the top left corner"
+                words += "; --track-format nuke-ascii counts from the bottom left"
+                table = replace(table, remarks=(*table.remarks, words))
+            return table
         case "nuke-ascii":
             return read_columns(text, name, first_frame)
     raise FileError(
