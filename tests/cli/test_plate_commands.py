@@ -26,7 +26,10 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_sources_are_listed_marked_and_written(capsys, folder):
+    # what a shot keeps stays
+    (folder / "l.sources.npz").write_bytes(b"kept")
     assert run(["sources", "photo.png", "--marked", "m.png", "--csv", "l.csv", "--json"]) == 0
+    (folder / "l.sources.npz").unlink()
     out = capsys.readouterr()
     data = json.loads(out.out)
     assert [(row["kind"], round(row["x"], 1), round(row["y"], 1)) for row in data["lights"]] == [

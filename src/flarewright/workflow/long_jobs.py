@@ -55,7 +55,7 @@ JOBS = (
     LongJob(("render",), "NAME.partial, NAME.state.npz", "the same command, or --resume NAME.state.npz"),
     LongJob(("shot",), "the finished frames"),
     LongJob(("dataset",), "the finished items", needs=("-o", "--output")),
-    LongJob(("sources",), "NAME.sources.npz", needs=("--csv", "--marked")),
+    LongJob(("sources",), "NAME.lights.npz", needs=("--csv", "--marked")),
     LongJob(("gallery",), "DIR/gallery.json"),
     LongJob(("library", "add"), "the library"),
     LongJob(("library", "thumbnails"), "the library"),

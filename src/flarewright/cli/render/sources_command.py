@@ -126,7 +126,7 @@ def _kept(options: SourcesOptions) -> Path | None:
     from ...workflow.plates.plate_sources import sources_file
 
     output = options.table or options.marked
-    return None if output is None else sources_file(str(output))
+    return None if output is None else sources_file(str(output), "lights")
 
 
 def _check_table(path: Path | None) -> None:

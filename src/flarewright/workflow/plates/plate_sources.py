@@ -207,8 +207,10 @@ def sources_of_frame(search: _Search, frame: int, threads: int | None = None) ->
     return found.table, frame
 
 
-def sources_file(output: str) -> Path:
+def sources_file(output: str, kind: str = "sources") -> Path:
     """Return the file beside the frames of a shot that keeps the sources of its plate.
+
+    A list of the lights alone has another `kind`: it deletes its file, and must not delete a shot's.
 
     Examples
     --------
@@ -216,7 +218,7 @@ def sources_file(output: str) -> Path:
     ('out/flare.sources.npz', 'flare.sources.npz')
     """
     path = Path(output)
-    return path.with_name(f"{FramePattern(path.name).stem}.sources.npz")
+    return path.with_name(f"{FramePattern(path.name).stem}.{kind}.npz")
 
 
 def plate_shot(
