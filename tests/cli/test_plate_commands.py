@@ -6,11 +6,15 @@ import csv
 import json
 
 import numpy as np
+import OpenEXR
 import pytest
 from PIL import Image
 
 from flarewright.cli.app import run
+from flarewright.cli.render.options.shot import ShotOptions
+from flarewright.cli.render.shot_command import _over_plate
 from flarewright.io.images.exr import read_exr
+from flarewright.plates.settings import PlateSettings
 
 FAST = ["--lens", "heliar-tronnier", "--fstop", "16", "--quality", "draft", "--wavelengths", "1", "--ideal"]
 
@@ -56,6 +60,13 @@ def test_a_still_gives_a_flare_and_a_comp(capsys, folder):
     assert read_exr("f.exr").size_px == (64, 36)
     # the white of the plate stands for more
     assert read_exr("c.exr").layers[0].pixels[9, 41, 0] > 5.0
+
+
+@pytest.mark.parametrize(("lens", "said"), [("anamorphic-heliar-2x", False), ("heliar-tronnier", True)])
+def test_pixels_of_a_plate_are_those_of_an_anamorphic_lens(folder, lens, said):
+    OpenEXR.File({"pixelAspectRatio": 2.0}, {"RGB": np.ones((4, 6, 3), np.float32)}).write("p.exr")
+    _, remarks = _over_plate(ShotOptions(plate="p.exr", lens=lens, output="f.exr"), PlateSettings("p.exr"))
+    assert any("--squeeze 2 gives the flare such pixels" in remark for remark in remarks) is said
 
 
 @pytest.mark.parametrize(

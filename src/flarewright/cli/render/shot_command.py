@@ -158,12 +158,26 @@ def _over_plate(options: ShotOptions, plate: PlateSettings) -> tuple[ShotOptions
         options = replace(options, size=f"{width}x{height}")
     if options.fps is None and options.project is None and first.fps is not None:
         options = replace(options, fps=float(first.fps))
-    if abs(first.pixel_aspect / (options.squeeze or 1.0) - 1.0) > 0.01 and not options.desqueeze:
+    # most plates of anamorphic lenses state square pixels
+    stated = options.squeeze is not None or first.pixel_aspect != 1.0
+    if stated and not options.desqueeze and abs(first.pixel_aspect / _squeeze(options) - 1.0) > 0.01:
         remarks.append(
             f"the plate states pixels {first.pixel_aspect:g} times as wide as high; --squeeze {first.pixel_aspect:g} "
             "gives the flare such pixels"
         )
     return options, remarks
+
+
+def _squeeze(options: ShotOptions) -> float:
+    """Return the squeeze of the options, or of their lens."""
+    from ...io.measurement.ghost_model_file import is_ghost_model_file
+    from ...render.scene.resolve import open_lens
+
+    if options.squeeze is not None:
+        return options.squeeze
+    if options.lens is None or is_ghost_model_file(options.lens):
+        return 1.0
+    return open_lens(options.lens).lens.squeeze or 1.0
 
 
 def _check_frame(options: ShotOptions, size_px: tuple[int, int]) -> None:
