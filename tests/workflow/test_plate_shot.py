@@ -15,6 +15,7 @@ from flarewright.errors import FlarewrightError
 from flarewright.io.images.exr import read_exr
 from flarewright.model import Holdout
 from flarewright.plates.settings import PlateSettings
+from flarewright.workflow.plates.plate_frame import alike_lights
 from flarewright.workflow.plates.plate_sources import plate_frames, plate_shot, sources_file
 
 SIZE = (64, 36)
@@ -218,3 +219,10 @@ def test_no_frame_of_the_plate_is_replaced(plates):
     with pytest.raises(FlarewrightError, match=r"would replace p\.1001\.exr"):
         draw(plates, plates, over=plates / "p.%04d.exr")
     assert (plates / "p.1001.exr").read_bytes() == before
+
+
+def test_a_lamp_that_is_switched_on_is_no_motion():
+    off = Project(lens="heliar-tronnier", lights=[Light(name="plate", field_deg=(0, 0), intensity=0)])
+    on = off.replace(lights=(Light(name="plate-1", field_deg=(9, 4)),))
+    before, after = alike_lights([off, on])
+    assert before == after

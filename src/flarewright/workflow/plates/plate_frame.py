@@ -122,12 +122,15 @@ def _optics_of(text: str) -> tuple[FieldMap, float]:
 
 
 def alike_lights(projects: Sequence[Project]) -> list[Project]:
-    """Return projects with the lights that all of them have, by name, so that their motion can be compared."""
+    """Return projects with the lights that all of them have, by name, so that their motion can be compared.
+
+    Where they share none, as before a lamp is switched on, all have those of the first: nothing moves.
+    """
     names = set.intersection(*({light.name for light in project.lights} for project in projects))
     found = []
     for project in projects:
         lights = tuple(light for light in project.lights if light.name in names)
-        found.append(project.replace(lights=lights) if lights else project)
+        found.append(project.replace(lights=lights or projects[0].lights))
     return found
 
 
