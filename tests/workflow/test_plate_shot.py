@@ -15,8 +15,10 @@ from flarewright.errors import FlarewrightError
 from flarewright.io.images.exr import read_exr
 from flarewright.model import Holdout
 from flarewright.plates.settings import PlateSettings
+from flarewright.render.render import BLACK
 from flarewright.workflow.plates.plate_frame import alike_lights
 from flarewright.workflow.plates.plate_sources import plate_frames, plate_shot, sources_file
+from flarewright.workflow.shot_frame import _draw
 
 SIZE = (64, 36)
 ROWS, COLUMNS = np.mgrid[: SIZE[1], : SIZE[0]] + 0.5
@@ -226,3 +228,13 @@ def test_a_lamp_that_is_switched_on_is_no_motion():
     on = off.replace(lights=(Light(name="plate-1", field_deg=(9, 4)),))
     before, after = alike_lights([off, on])
     assert before == after
+
+
+def test_a_frame_that_is_dark_only_at_first_is_not_called_black():
+    on = Project(
+        lens="heliar-tronnier", f_number=16, lights=[Light(field_deg=(5, 3))], camera=Camera(size_px=(64, 36)),
+        quality=Quality(mode="draft", wavelengths=1),
+    )  # fmt: skip
+    off = on.replace(lights=(Light(field_deg=(5, 3), intensity=0.0),))
+    assert BLACK in _draw((off, off), 1).remarks
+    assert BLACK not in _draw((off, on), 1).remarks

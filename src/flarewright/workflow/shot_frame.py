@@ -22,7 +22,7 @@ from ..jobs.frame_list import FramePattern
 from ..jobs.worker import WRITING
 from ..measure.replay.measured_project import is_measured, render_measured
 from ..model import Layer, Project
-from ..render.render import Rendering
+from ..render.render import BLACK, Rendering
 from ..render.render import render as render_project
 from ..render.scene.resolve import open_lens, resolve_project
 from .keyframes import frame_rate, peak_intensity, project_at, still, time_of
@@ -268,7 +268,10 @@ def _draw(moments: tuple[Project, ...], threads: int | None) -> Rendering:
         singles.sort(key=lambda layer: -float(layer.pixels.sum(dtype="f8")))
         dropped = {layer.name for layer in singles[brightest:]}
         mean = [layer for layer in mean if layer.name not in dropped]
-    return replace(first, layers=tuple(mean))  # type: ignore[arg-type]
+    # a lamp may be switched on after the first moment
+    lit = any(layer.pixels.any() for layer in mean)
+    remarks = tuple(remark for remark in first.remarks if not (lit and remark == BLACK))
+    return replace(first, layers=tuple(mean), remarks=remarks)  # type: ignore[arg-type]
 
 
 def _render(project: Project, threads: int | None) -> Rendering:
