@@ -214,6 +214,12 @@ def test_one_picture_lights_all_frames(plates, tmp_path):
     assert np.array_equal(one, two)
 
 
+@pytest.mark.parametrize(("fade", "said"), [(PlateSettings.fade, False), (2, True)])
+def test_a_fade_of_a_single_plate_has_no_effect(plates, fade, said):
+    found = plate_shot(PlateSettings(str(plates / "p.1001.exr"), threshold=1.0, fade=fade), [1001])
+    assert any("--fade has no effect" in remark for remark in found.remarks) == said
+
+
 def test_no_frame_of_the_plate_is_replaced(plates):
     before = (plates / "p.1001.exr").read_bytes()
     with pytest.raises(FlarewrightError, match=r"would replace p\.1001\.exr, which the shot reads or writes"):

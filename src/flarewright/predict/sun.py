@@ -49,7 +49,9 @@ def sun_path(site: Site, times: Sequence[datetime]) -> tuple[Floats, Floats]:
     found = []
     for time in times:
         if not 1900 <= time.year <= 2100:
-            raise FlarewrightError(f"the sun's path is known for the years 1900 to 2100, not for {time.year}")
+            raise FlarewrightError(
+                f"the sun's path is known for the years 1900 to 2100, not for {time.year}; check the date"
+            )
         utc = time.astimezone(UTC)
         found.append((sun.azimuth(here, utc), sun.elevation(here, utc, with_refraction=True)))
     return np.array([one[0] for one in found]), np.array([one[1] for one in found])

@@ -171,7 +171,9 @@ def _print_table(rows: list[dict[str, Any]], frames: tuple[int, ...]) -> None:
     from rich.table import Table
 
     first = [row for row in rows if row["frame"] == rows[0]["frame"]]
-    table = Table(title=f"{len(first)} lights in frame {rows[0]['frame']}, of {len(frames)} frames")
+    table = Table(
+        title=f"{len(first)} light{'s'[: len(first) != 1]} in frame {rows[0]['frame']}, of {len(frames)} frames"
+    )
     for name in ("light", "kind", "x", "y", "width", "height", "red:green:blue", "share"):
         table.add_column(name, justify="left" if name == "kind" else "right")
     for row in first[:_MOST_LINES]:

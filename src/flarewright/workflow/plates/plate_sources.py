@@ -286,9 +286,11 @@ def plate_shot(
     if joined_sources:
         share = 1.0 - (limited.light[: len(limited) - groups] @ LUMINANCE).sum() / (tracks.light @ LUMINANCE).sum()
         remarks.append(
-            f"{joined_sources} of {len(tracks)} sources, with {share:.1%} of the light, are joined to {groups} lights "
-            "that have ghosts only; --most-lights allows more"
+            f"{joined_sources} of {len(tracks)} sources, with {share:.1%} of the light, are joined to {groups} "
+            f"light{'s'[: groups > 1]} with ghosts only; --most-lights allows more"
         )
+    if still and settings.fade != PlateSettings.fade:
+        remarks.append("--fade has no effect on a single plate, whose lights do not change")
     if settings.highlights is not None and first.white is None:
         remarks.append("--highlights has no effect on a plate of floating-point numbers, which does not clip")
     clips_at = None
