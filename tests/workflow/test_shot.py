@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from fractions import Fraction
 from pathlib import Path
 
@@ -278,3 +280,10 @@ def test_a_full_disk_is_one_sentence(tmp_path, monkeypatch):
     with pytest.raises(OutputError, match=r"cannot write .*f\.1\.exr: no space left on device"):
         shot(project(), tmp_path / "f.#.exr", processes=1)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_process_that_draws_frames_loads_what_searches_plates_only_for_a_plate():
+    """SciPy's import takes longer than a draft."""
+    loaded = "{'scipy.ndimage', 'scipy.spatial'} & set(sys.modules)"
+    code = f"import sys, flarewright.workflow.shot_frame; assert not {loaded}"
+    subprocess.run([sys.executable, "-c", code], check=True)

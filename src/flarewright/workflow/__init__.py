@@ -22,6 +22,7 @@ The command line and other front ends call these functions; nothing here prints.
 - `shot_frame`: `draw_frame`, one of them, and the digest of what made it
 - `nuke_script`: `nuke_script`, the text of a script or gizmo that composites a flare in Nuke
 - `nuke_graph`: `flare_nodes`, `nodes_text`, its nodes and their text
+- `frame_files`: `with_frame_files`, the files of one frame of sequences that hide lights
 - `motion_blur`: `subframe_count` and `mean_layers`, the mean over the open shutter
 - `training_pairs`: `dataset` draws training pairs for flare removal and detection
 - `long_jobs`: `JOBS` lists the commands that can run for more than a minute, and how each keeps its partial work

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from .._version import __version__
 from ..errors import FlarewrightError, OutputError, ProjectError
@@ -25,10 +25,12 @@ from ..model import Layer, Project
 from ..render.render import BLACK, Rendering
 from ..render.render import render as render_project
 from ..render.scene.resolve import open_lens, resolve_project
+from .frame_files import with_frame_files
 from .keyframes import frame_rate, peak_intensity, project_at, still, time_of
 from .motion_blur import mean_layers, subframe_count, subframe_times
-from .plates.plate_frame import alike_lights, comp_attributes, with_frame_files, with_plate_lights, write_comp
-from .plates.plate_sources import PlateShot
+
+if TYPE_CHECKING:
+    from .plates.plate_sources import PlateShot
 
 __all__ = ["FrameResult", "ShotPlan", "draw_frame", "frame_project", "part_name"]
 
@@ -121,7 +123,12 @@ def _moment(plan: ShotPlan, at_s: float) -> tuple[Project, float]:
     # a time is a rounded number of frames
     frame = round(timeline.start + at_s * float(frame_rate(timeline.fps)), 6)
     project = with_frame_files(still(project_at(plan.project, at_s)), frame)
-    return (project, 0.0) if plan.plate is None else with_plate_lights(project, plan.plate, frame)
+    if plan.plate is None:
+        return project, 0.0
+    # imports SciPy, which frames without a plate do not need
+    from .plates.plate_frame import with_plate_lights
+
+    return with_plate_lights(project, plan.plate, frame)
 
 
 def draw_frame(plan: ShotPlan, frame: int, threads: int | None = None) -> FrameResult:
@@ -195,8 +202,11 @@ def _moments(plan: ShotPlan, frame: int) -> tuple[Project, ...]:
         projects = [frame_project(plan, sample) for sample in samples]
         # brightness and colour change without motion; the samples are enough for them
         still_bright = all(project == projects[0] for project in projects)
-        alike = projects if plan.plate is None else alike_lights(projects)
-        number = 1 if still_bright else max(_SAMPLES, subframe_count(alike))
+        if plan.plate is not None:
+            from .plates.plate_frame import alike_lights
+
+            projects = alike_lights(projects)
+        number = 1 if still_bright else max(_SAMPLES, subframe_count(projects))
     moments = [frame_project(plan, moment) for moment in subframe_times(at_s, plan.open_s, number)]
     if moments[0].quality.mode == "reference":
         # independent errors, which the mean reduces
@@ -298,6 +308,8 @@ def _write(plan: ShotPlan, frame: int, moments: tuple[Project, ...], rendering: 
         frame=frame, fps=frame_rate(plan.project.timeline.fps), shutter_s=plan.open_s, **_facts(shown)
     )
     if plan.plate is not None:
+        from .plates.plate_frame import comp_attributes, write_comp
+
         attributes |= comp_attributes(plan.plate, frame)
     names = [part_name(layer.name) for layer in rendering.layers]
     if len(set(names)) < len(names):

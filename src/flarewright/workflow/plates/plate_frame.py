@@ -1,4 +1,4 @@
-"""A frame of a shot over a plate: its lights from the plate, its files from sequences, and its comp."""
+"""A frame of a shot over a plate: its lights from the plate, and its comp."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Any
 
 from ...errors import ProjectError
 from ...io.images.exr import write_exr
-from ...jobs.frame_list import FramePattern
 from ...measure.replay.measured_project import is_measured
 from ...model import Art, Dirt, Layer, Light, Output, Project, Quality, Starburst
 from ...plates.comp import composed, source_mask
@@ -24,7 +23,6 @@ __all__ = [
     "check_comp",
     "check_plate",
     "comp_attributes",
-    "with_frame_files",
     "with_plate_lights",
     "write_comp",
 ]
@@ -33,38 +31,6 @@ __all__ = [
 _BEAUTY = "beauty"
 # relative difference of the shapes of plate and picture
 _SHAPE_TOLERANCE = 0.01
-
-
-def with_frame_files(project: Project, frame: float) -> Project:
-    """Return a project with the files of a frame instead of names with a place for its number.
-
-    Parameters
-    ----------
-    project : Project
-        Its holdouts, and those of its lights, can be sequences.
-    frame : float
-        Number; between two frames, the nearest one's files.
-    """
-    changes: dict[str, Any] = {}
-    number = round(frame)
-    if project.holdout is not None:
-        changes["holdout"] = _numbered(project.holdout, number)
-    if any(light.holdout is not None for light in project.lights):
-        changes["lights"] = tuple(
-            light if light.holdout is None else light.replace(holdout=_numbered(light.holdout, number))
-            for light in project.lights
-        )
-    found: Project = project.replace(**changes) if changes else project
-    return found
-
-
-def _numbered(holdout: Any, frame: int) -> Any:
-    files = {
-        key: str(FramePattern(name).path(frame))
-        for key in ("image", "depth")
-        if (name := getattr(holdout, key)) is not None and FramePattern(name).numbered
-    }
-    return holdout.replace(**files) if files else holdout
 
 
 def with_plate_lights(project: Project, plate: PlateShot, frame: float) -> tuple[Project, float]:

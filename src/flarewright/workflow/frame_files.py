@@ -1,0 +1,48 @@
+"""Sequences of images that hide lights: a holdout or a depth picture for each frame of a shot."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..jobs.frame_list import FramePattern
+from ..model import Project
+
+__all__ = ["holdout_files", "with_frame_files"]
+
+
+def holdout_files(project: Project) -> tuple[str, ...]:
+    """Return the files that hide lights of a project, or names with a place for the number of the frame."""
+    holdouts = [project.holdout, *(light.holdout for light in project.lights)]
+    return tuple(name for each in holdouts if each is not None for name in (each.image, each.depth) if name is not None)
+
+
+def with_frame_files(project: Project, frame: float) -> Project:
+    """Return a project with the files of a frame instead of names with a place for its number.
+
+    Parameters
+    ----------
+    project : Project
+        Its holdouts, and those of its lights, can be sequences.
+    frame : float
+        Number; between two frames, the nearest one's files.
+    """
+    changes: dict[str, Any] = {}
+    number = round(frame)
+    if project.holdout is not None:
+        changes["holdout"] = _numbered(project.holdout, number)
+    if any(light.holdout is not None for light in project.lights):
+        changes["lights"] = tuple(
+            light if light.holdout is None else light.replace(holdout=_numbered(light.holdout, number))
+            for light in project.lights
+        )
+    found: Project = project.replace(**changes) if changes else project
+    return found
+
+
+def _numbered(holdout: Any, frame: int) -> Any:
+    files = {
+        key: str(FramePattern(name).path(frame))
+        for key in ("image", "depth")
+        if (name := getattr(holdout, key)) is not None and FramePattern(name).numbered
+    }
+    return holdout.replace(**files) if files else holdout
