@@ -61,6 +61,21 @@ def shares(items: int, processes: int | None = None, threads: int | None = None)
     return number, max(1, all_threads // number)
 
 
+def fitting(process_bytes: float, threads: int | None) -> int:
+    """Return how many processes the cores, or the wanted threads of all together, and the free memory allow.
+
+    Parameters
+    ----------
+    process_bytes : float
+        Memory of one.
+    threads : int, optional
+        None: the cores.
+    """
+    from ..render.scene.memory_check import spare_bytes
+
+    return max(1, int(min(threads or cores(), spare_bytes() / process_bytes)))
+
+
 def work_off(
     function: str,
     context: Any,

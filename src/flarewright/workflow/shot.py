@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Literal
 
 from ..errors import FlarewrightError, OutputError, ProjectError
 from ..jobs.frame_list import FramePattern, chunk_of, frames_text, parse_chunk, parse_frames
-from ..jobs.processes import shares, work_off
+from ..jobs.processes import fitting, shares, work_off
 from ..model import Project
+from .frame_files import holdout_files
 from .keyframes import frame_rate, is_still, length_s, time_of
 
 if TYPE_CHECKING:
@@ -149,7 +150,9 @@ def shot(
     if not mine:
         return ShotResult((), (*remarks, f"chunk {chunk} of {len(numbers)} frames is empty"), 0, found)
     _check_moments(plan, mine)
-    number, each = shares(len(mine), processes if processes is not None else _fitting(plan, threads), threads)
+    if processes is None:
+        processes = fitting(_process_bytes(plan), threads)
+    number, each = shares(len(mine), processes, threads)
     if prepare is not None:
         for frame in {mine[0], mine[len(mine) // 2], mine[-1]}:
             prepare(frame_project(plan, time_of(frame, project.timeline)), number * each)
@@ -178,10 +181,8 @@ def _keep_sequences(
     project: Project, plate: PlateSettings | None, output: FramePattern, comp: str, frames: Sequence[int]
 ) -> None:
     """Raise an error if a frame would replace one that is read, or another one that is written."""
-    holdouts = [project.holdout, *(light.holdout for light in project.lights)]
-    read = [name for each in holdouts if each is not None for name in (each.image, each.depth)]
-    read += [] if plate is None else [plate.files, plate.matte]
-    known = {FramePattern(name).path(frame).resolve() for name in read if name is not None for frame in frames}
+    read = {*holdout_files(project), *(() if plate is None else (plate.files, plate.matte))} - {None}
+    known = {FramePattern(name).path(frame).resolve() for name in read for frame in frames}
     for pattern in (output, *([FramePattern(comp)] if comp else [])):
         written = {pattern.path(frame).resolve() for frame in frames}
         if written & known:
@@ -216,9 +217,7 @@ def _searched(
 
 def _sequences(project: Project) -> list[FramePattern]:
     """Return the sequences of images that hide lights."""
-    holdouts = [project.holdout, *(light.holdout for light in project.lights)]
-    names = {name for each in holdouts if each is not None for name in (each.image, each.depth) if name is not None}
-    return [pattern for pattern in map(FramePattern, sorted(names)) if pattern.numbered]
+    return [pattern for pattern in map(FramePattern, sorted({*holdout_files(project)})) if pattern.numbered]
 
 
 def _check_sequences(project: Project, frames: Sequence[int]) -> None:
@@ -344,11 +343,8 @@ def _check_moments(plan: ShotPlan, frames: Sequence[int]) -> None:
             raise type(error)(f"at {at_s:g} s: {error}" if at_s else str(error), error.problems) from None
 
 
-def _fitting(plan: ShotPlan, threads: int | None) -> int:
-    """Return how many processes the cores, or the wanted threads, and the free memory allow."""
-    from ..kernels.jit.warmup_processes import cores
-    from ..render.scene.memory_check import spare_bytes
-
+def _process_bytes(plan: ShotPlan) -> int:
+    """Return the memory that a process needs for a frame."""
     project = plan.project
     width, height = project.camera.size_px
     layers = 0
@@ -356,5 +352,4 @@ def _fitting(plan: ShotPlan, threads: int | None) -> int:
         # a blurred frame averages all ghosts before it chooses the brightest
         chosen = project.output.brightest if plan.shutter_deg == 0.0 else None
         layers = _MOST_LAYERS if chosen is None else chosen
-    each = _PROCESS_BYTES + width * height * (_PIXEL_BYTES + layers * _LAYER_BYTES)
-    return max(1, int(min(threads or cores(), spare_bytes() / each)))
+    return _PROCESS_BYTES + width * height * (_PIXEL_BYTES + layers * _LAYER_BYTES)

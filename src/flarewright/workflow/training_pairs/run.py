@@ -19,7 +19,7 @@ from ...io.files.text_file import digest_of, read_bytes, read_json
 from ...io.project.dataset_file import contradictions, read_dataset_spec
 from ...io.project.named_files import picture_files
 from ...jobs.frame_list import chunk_of, parse_chunk
-from ...jobs.processes import shares, work_off
+from ...jobs.processes import fitting, shares, work_off
 from ...model import Project
 from ...model.project.dataset import SPLITS, DatasetSpec
 from ...render.scene.resolve import open_lens
@@ -145,7 +145,9 @@ def dataset(
     done = [ItemResult(index, _split(settings, index), False) for unit in packed for index in unit]
     ready = {one.index for one in done}
     todo = [index for index in mine if index not in ready]
-    number, each = shares(len(todo), processes or _fitting(plan, threads), threads)
+    width, height = settings.size_px
+    fit = fitting(_PROCESS_BYTES + width * height * _PIXEL_BYTES, threads)
+    number, each = shares(len(todo), processes or fit, threads)
     if prepare is not None and todo:
         for index in todo[:: max(1, len(todo) // _COMPILED)][:_COMPILED]:
             prepare(draw_item(settings, index).project, number * each)
@@ -396,16 +398,6 @@ def _result(
         processes,
         tuple(remarks),
     )
-
-
-def _fitting(plan: DatasetPlan, threads: int | None) -> int:
-    """Return how many processes the cores, or the wanted threads, and the free memory allow."""
-    from ...kernels.jit.warmup_processes import cores
-    from ...render.scene.memory_check import spare_bytes
-
-    width, height = plan.spec.size_px
-    each = _PROCESS_BYTES + width * height * _PIXEL_BYTES
-    return max(1, int(min(threads or cores(), spare_bytes() / each)))
 
 
 __all__ = ["DatasetResult", "dataset", "plan_of", "write_item"]
