@@ -109,13 +109,28 @@ class FramePattern:
         >>> str(FramePattern("flare.####.exr").path(7)), str(FramePattern("a_$F2.exr").path(101))
         ('flare.0007.exr', 'a_101.exr')
         """
-
-        def number(match: re.Match[str]) -> str:
-            width = len(match["hashes"] or "") or int(match["percent"] or match["houdini"] or 0)
-            return f"{frame:0{width}d}" if width else str(frame)
-
+        width = self.digits
         path = Path(self.text)
-        return path.with_name(_FIELD.sub(number, path.name))
+        return path.with_name(_FIELD.sub(f"{frame:0{width}d}" if width else str(frame), path.name))
+
+    @property
+    def digits(self) -> int:
+        """Least number of digits of the frame's number; 0 if it has as many as it needs."""
+        field = _FIELD.search(Path(self.text).name)
+        if field is None:
+            return 0
+        return len(field["hashes"] or "") or int(field["percent"] or field["houdini"] or 0)
+
+    def rewritten(self, place: str) -> str:
+        """Return the name with another way to write the place of the number.
+
+        Examples
+        --------
+        >>> FramePattern("out/flare.$F4.exr").rewritten("####")
+        'out/flare.####.exr'
+        """
+        path = Path(self.text)
+        return str(path.with_name(_FIELD.sub(place, path.name)))
 
     @property
     def stem(self) -> str:

@@ -159,7 +159,11 @@ def _sequence(text: str, frames: Sequence[int] | None) -> Frames:
             )
         first, last = (1, 1) if frames is None else (min(frames), max(frames))
         return Frames(_absolute(Path(text)), first, last)
-    there = _numbers(pattern)
+    try:
+        there = set(pattern.on_disk())
+    except ProjectError:
+        # a folder that cannot be read has no files
+        there = set()
     if not there:
         raise ProjectError(f"there are no files {shown(text)}: draw them with flarewright shot, or check the path")
     wanted = set(there if frames is None else frames)
@@ -173,9 +177,9 @@ def _sequence(text: str, frames: Sequence[int] | None) -> Frames:
     )
     if first not in there:
         raise ProjectError(f"{shown(str(pattern.path(first)))} does not exist: choose --frames that there are")
-    # the width of the number as Nuke writes it
-    width = next((n for n in range(1, 10) if pattern.path(1) == FramePattern(_hashes(text, n)).path(1)), 1)
-    return Frames(_absolute(Path(_hashes(text, width))), first, last, missing)
+    # the number as Nuke writes it
+    place = "#" * pattern.digits if pattern.digits > 1 else "%d"
+    return Frames(_absolute(Path(pattern.rewritten(place))), first, last, missing)
 
 
 def _check_scales(pattern: FramePattern, files: Frames, scale: float) -> None:
@@ -191,28 +195,6 @@ def _check_scales(pattern: FramePattern, files: Frames, scale: float) -> None:
                 f"{shown(path)} holds irradiances times {other:g}, {shown(first)} times {scale:g}: draw all frames "
                 "with flarewright shot, or with --float"
             )
-
-
-_NUMBER = re.compile(r"#+|%(?:0\d{1,2})?d|\$F\d?")
-
-
-def _hashes(text: str, width: int) -> str:
-    path = Path(text)
-    number = "#" * width if width > 1 else "%d"
-    return str(path.with_name(_NUMBER.sub(number, path.name)))
-
-
-def _numbers(pattern: FramePattern) -> set[int]:
-    """Return the numbers of the files of a pattern."""
-    path = Path(pattern.text)
-    before, after = _NUMBER.split(path.name, maxsplit=1)
-    name = re.compile(rf"{re.escape(before)}(-?\d{{1,9}}){re.escape(after)}")
-    try:
-        names = [entry.name for entry in path.parent.iterdir()]
-    except OSError:
-        return set()
-    found = {int(match[1]) for match in map(name.fullmatch, names) if match}
-    return {frame for frame in found if pattern.path(frame).name in names}
 
 
 def _absolute(path: Path) -> str:
