@@ -12,14 +12,13 @@ import numpy as np
 from scipy import ndimage
 
 from ..errors import ProjectError
+from ..optics.colour.rgb import luminance_weights
 from ..typing import Floats, Indices, Mask, Pixels
 
 __all__ = ["LUMINANCE", "DetectionSettings", "Sources", "find_sources", "mean_luminance", "plate_luminance"]
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-"""Luminance of linear Rec.709 (ITU-R BT.709-6, item 3.2)."""
-
-
+LUMINANCE = luminance_weights("rec709")
+"""Luminance of linear Rec.709."""
 # places at which a change of colour is searched
 _CUTS = 8
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import pi
 from typing import Literal
 
 from ..errors import ProjectError
@@ -154,5 +155,5 @@ def parse_source(text: str) -> SourceKind:
         raise ProjectError(f"--source {text[:60]!r} needs a distance; {wanted}") from None
     if not (0.0 < distance_m < 1e9 and 0.0 < flux < 1e12):
         raise ProjectError(f"--source {text[:60]!r} has a value that is not above 0; {wanted}")
-    candela = HIGH_BEAM_CD if word == "headlight" else flux / (4.0 * 3.141592653589793)
+    candela = HIGH_BEAM_CD if word == "headlight" else flux / (4.0 * pi)
     return SourceKind("lamp", candela / distance_m**2)
