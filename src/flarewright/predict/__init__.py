@@ -10,7 +10,7 @@
 - `occurrence`: `predict_occurrence` predicts the flare of one camera; `occurrence_data` as JSON
 - `occurrence_page`: `occurrence_page`, its HTML report
 - `photometry`: illuminance by lamps, and exposure of a sensor
-- `sun`: path and illuminance of the sun
+- `sun`: path and illuminance of the sun; `sky_direction`
 - `tracks`: positions of a scene's cameras and lights over time (`sightings`)
 - `plan`: `plan_scene` predicts the flare of a scene; `ranking` sorts its pairs of camera and light
 - `switching`: `choose_cameras` chooses the camera with the least flare over time

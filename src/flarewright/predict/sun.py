@@ -57,6 +57,29 @@ def sun_path(site: Site, times: Sequence[datetime]) -> tuple[Floats, Floats]:
     return np.array([one[0] for one in found]), np.array([one[1] for one in found])
 
 
+def sky_direction(azimuth_deg: ArrayLike, elevation_deg: ArrayLike) -> Floats:
+    """Return unit vectors towards places of the sky.
+
+    Parameters
+    ----------
+    azimuth_deg, elevation_deg : array_like
+        Clockwise from north, and above the horizon.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        East, north and up.
+
+    Examples
+    --------
+    >>> sky_direction(90.0, 0.0).round(6).tolist()
+    [1.0, 0.0, 0.0]
+    """
+    turn, height = np.radians(azimuth_deg), np.radians(elevation_deg)
+    flat = np.cos(height)
+    return np.stack([np.sin(turn) * flat, np.cos(turn) * flat, np.sin(height)], axis=-1)
+
+
 def sun_illuminance(elevation_deg: ArrayLike) -> Floats:
     """Compute the illuminance by the sun in a clear sky on a plane facing it.
 

@@ -14,7 +14,7 @@ from ..model.project.scene import Distant, Lamp, Scene, SceneCamera, SceneLight
 from ..optics.lens.field_angles import constellation_and_roll, view_axes
 from ..typing import Floats, Mask
 from .photometry import beam, disc_illuminance, point_illuminance
-from .sun import sun_illuminance, sun_path
+from .sun import sky_direction, sun_illuminance, sun_path
 
 __all__ = ["CameraSighting", "CameraTrack", "camera_track", "moments", "moved_by", "sightings"]
 
@@ -173,9 +173,7 @@ def _sky(scene: Scene, light: SceneLight, dates: Sequence[datetime] | None) -> t
         clear = sun_illuminance(elevation)
         lux = clear if light.illuminance_lx is None else np.full(len(elevation), light.illuminance_lx)
         lux, across = np.where(elevation >= light.horizon_deg, lux, 0.0), SUN_DEG
-    turn, height = np.radians(azimuth - scene.north_deg), np.radians(elevation)
-    flat = np.cos(height)
-    return np.stack([np.sin(turn) * flat, np.cos(turn) * flat, np.sin(height)], axis=-1), lux, across
+    return sky_direction(azimuth - scene.north_deg, elevation), lux, across
 
 
 def _far(track: CameraTrack, direction: Floats, lux: Floats, across: float) -> CameraSighting:

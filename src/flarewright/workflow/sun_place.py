@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import ProjectError
 from ..model.project.scene import Site
+from ..predict.sun import sky_direction, sun_illuminance, sun_path
 from ..typing import Floats
 
 __all__ = ["CameraAim", "SunPlace", "sun_place"]
@@ -81,15 +82,13 @@ def sun_place(when: datetime, site: Site, aim: CameraAim) -> SunPlace:
     -----
     Tests: tests/workflow/test_sun_place.py compares with Meeus' formulas and with the orientation of a photograph.
     """
-    from ..predict.sun import sun_illuminance, sun_path
-
     azimuth, elevation = (float(each[0]) for each in sun_path(site, [when]))
     if elevation < _SETTING_DEG:
         raise ProjectError(
             f"--sun: the sun is {-elevation:.1f} degrees below the horizon then and there; check the time with its "
             "offset from UTC, and the longitude, which counts east"
         )
-    x, y, z = _axes(aim) @ _direction(azimuth, elevation)
+    x, y, z = _axes(aim) @ sky_direction(azimuth, elevation)
     away = float(np.degrees(np.arctan2(np.hypot(x, y), z)))
     if away > _LARGEST_DEG:
         raise ProjectError(
@@ -100,15 +99,9 @@ def sun_place(when: datetime, site: Site, aim: CameraAim) -> SunPlace:
     return SunPlace(azimuth, elevation, (float(field[0]), float(field[1])), float(sun_illuminance(elevation)))
 
 
-def _direction(azimuth_deg: float, elevation_deg: float) -> Floats:
-    """Return a unit vector, east, north and up."""
-    azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
-    return np.array([np.sin(azimuth) * np.cos(elevation), np.cos(azimuth) * np.cos(elevation), np.sin(elevation)])
-
-
 def _axes(aim: CameraAim) -> Floats:
     """Return the camera's right, up and forward in rows: east, north and up."""
-    forward = _direction(aim.heading_deg, aim.tilt_deg)
+    forward = sky_direction(aim.heading_deg, aim.tilt_deg)
     heading = np.radians(aim.heading_deg)
     # the horizontal direction right of the heading, so that a camera that looks at the zenith has axes too
     right = np.array([np.cos(heading), -np.sin(heading), 0.0])
