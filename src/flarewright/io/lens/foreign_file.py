@@ -6,8 +6,14 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import zip_longest
+from pathlib import Path
 
 from flarewright.errors import FileError, LensError
+from flarewright.model.lens.raw_lens import RawSequence
+
+from ..files.door import sentences_for
+from ..files.sentences import summary
+from ..files.text_file import read_bytes
 
 MOST_SURFACES = 500
 """Largest number of surfaces: photographic lenses have up to sixty; longer files are not lenses."""
@@ -22,6 +28,22 @@ def lens_errors() -> Iterator[None]:
         yield
     except FileError as error:
         raise LensError(str(error), (str(error),)) from error
+
+
+@contextmanager
+def lens_data(path: str | Path, what: str) -> Iterator[bytes]:
+    """Give the bytes of a lens file; whatever is raised while they are read becomes a LensError of one sentence."""
+    with lens_errors():
+        data = read_bytes(path, what)
+        with sentences_for(path, what):
+            yield data
+
+
+def whole(path: str | Path, raw: RawSequence | None, problems: list[str]) -> RawSequence:
+    """Return what was read of a file; raise a LensError with all its problems if there are any."""
+    if raw is None or problems:
+        raise LensError(summary(str(path), problems), tuple(problems))
+    return raw
 
 
 def decoded(data: bytes) -> str:
@@ -64,4 +86,14 @@ def largest_field(x: Sequence[float | None], y: Sequence[float | None]) -> float
     return max((math.hypot(a or 0.0, b or 0.0) for a, b in zip_longest(x, y)), default=0.0)
 
 
-__all__ = ["INFINITE", "MOST_SURFACES", "decoded", "json_number", "largest_field", "lens_errors", "number_of"]
+__all__ = [
+    "INFINITE",
+    "MOST_SURFACES",
+    "decoded",
+    "json_number",
+    "largest_field",
+    "lens_data",
+    "lens_errors",
+    "number_of",
+    "whole",
+]

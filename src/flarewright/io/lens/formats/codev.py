@@ -18,15 +18,13 @@ from typing import Literal
 
 from pydantic import ValidationError
 
-from flarewright.errors import LensError
 from flarewright.model import Medium, Surface
 from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
 
-from ...files.door import sentences_for, shown
-from ...files.sentences import shorten, summary, validation_sentences
-from ...files.text_file import read_bytes
+from ...files.door import shown
+from ...files.sentences import shorten, validation_sentences
 from .. import media
-from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_errors, number_of
+from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_data, number_of, whole
 from ..lens_fields import CURVATURE
 from ..medium_names import named_medium, tabulated_medium
 
@@ -102,15 +100,11 @@ def read_seq(path: str | Path, first_column: FirstColumn | None = None) -> RawSe
         When the file cannot be read or is not supported; `problems` gives each surface by its number, the object is 0.
     """
     reading = _Reading()
-    with lens_errors():
-        data = read_bytes(path, "a .seq file")
-        with sentences_for(path, "a .seq file"):
-            for words in _commands(decoded(data)):
-                _command(words, reading)
-            raw = _sequence(Path(path), reading, first_column)
-    if raw is None or reading.problems:
-        raise LensError(summary(str(path), reading.problems), tuple(reading.problems))
-    return raw
+    with lens_data(path, "a .seq file") as data:
+        for words in _commands(decoded(data)):
+            _command(words, reading)
+        raw = _sequence(Path(path), reading, first_column)
+    return whole(path, raw, reading.problems)
 
 
 def _commands(text: str) -> list[list[str]]:

@@ -23,10 +23,10 @@ from flarewright.model.lens.prescription import MOST_TERMS
 from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
 
 from ...files.door import sentences_for, shown
-from ...files.sentences import shorten, summary, validation_sentences
+from ...files.sentences import shorten, validation_sentences
 from ...files.text_file import read_json
 from .. import media
-from ..foreign_file import INFINITE, MOST_SURFACES, json_number, largest_field, lens_errors
+from ..foreign_file import INFINITE, MOST_SURFACES, json_number, largest_field, lens_errors, whole
 from ..lens_fields import CURVATURE
 from ..medium_names import numbered_medium
 
@@ -58,9 +58,7 @@ def read_optiland(path: str | Path) -> RawSequence:
         data = read_json(path, "a lens of Optiland", foreign=True)
         with sentences_for(path, "a lens of Optiland"):
             raw = _sequence(Path(path), data, problems)
-    if raw is None or problems:
-        raise LensError(summary(str(path), problems), tuple(problems))
-    return raw
+    return whole(path, raw, problems)
 
 
 def _sequence(path: Path, data: Any, problems: list[str]) -> RawSequence | None:

@@ -18,16 +18,14 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from flarewright.errors import LensError
 from flarewright.model import Medium, Surface
 from flarewright.model.lens.prescription import MOST_TERMS
 from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
 
-from ...files.door import sentences_for, shown
-from ...files.sentences import shorten, summary, validation_sentences
-from ...files.text_file import read_bytes
+from ...files.door import shown
+from ...files.sentences import shorten, validation_sentences
 from .. import media
-from ..foreign_file import INFINITE, MOST_SURFACES, decoded, lens_errors, number_of
+from ..foreign_file import INFINITE, MOST_SURFACES, decoded, lens_data, number_of, whole
 from ..lens_fields import CURVATURE
 from ..medium_names import named_medium, numbered_medium, tabulated_medium
 
@@ -112,15 +110,11 @@ def read_len(path: str | Path) -> RawSequence:
         When the file cannot be read or is not supported; `problems` gives each surface by its number, the object is 0.
     """
     reading = _Reading()
-    with lens_errors():
-        data = read_bytes(path, "a .len file")
-        with sentences_for(path, "a .len file"):
-            for words in _commands(decoded(data)):
-                _command(words, reading)
-            raw = _sequence(Path(path), reading)
-    if raw is None or reading.problems:
-        raise LensError(summary(str(path), reading.problems), tuple(reading.problems))
-    return raw
+    with lens_data(path, "a .len file") as data:
+        for words in _commands(decoded(data)):
+            _command(words, reading)
+        raw = _sequence(Path(path), reading)
+    return whole(path, raw, reading.problems)
 
 
 def _commands(text: str) -> Iterator[list[str]]:

@@ -19,16 +19,15 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from flarewright.errors import GlassError, LensError
+from flarewright.errors import GlassError
 from flarewright.model import Medium, Surface
 from flarewright.model.lens.prescription import MOST_TERMS
 from flarewright.model.lens.raw_lens import Configuration, RawSequence, SequenceRow
 
-from ...files.door import sentences_for, shown
-from ...files.sentences import did_you_mean, shorten, summary, validation_sentences
-from ...files.text_file import read_bytes
+from ...files.door import shown
+from ...files.sentences import did_you_mean, shorten, validation_sentences
 from .. import media
-from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_errors, number_of
+from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_data, number_of, whole
 from ..glass_catalogue import CatalogueGlass, by_name, same_name
 from ..lens_fields import CURVATURE, ROW_NUMBERS
 from .configurations import configurations
@@ -72,14 +71,10 @@ def read_zmx(path: str | Path) -> RawSequence:
     LensError
         When the file cannot be read or is not supported; `problems` gives each surface by the file's number.
     """
-    with lens_errors():
-        data = read_bytes(path, "a .zmx file")
-        with sentences_for(path, "a .zmx file"):
-            found = grouped(decoded(data))
-            raw = _sequential(Path(path), found)
-    if raw is None or found.problems:
-        raise LensError(summary(str(path), found.problems), tuple(found.problems))
-    return raw
+    with lens_data(path, "a .zmx file") as data:
+        found = grouped(decoded(data))
+        raw = _sequential(Path(path), found)
+    return whole(path, raw, found.problems)
 
 
 def _sequential(path: Path, found: Text) -> RawSequence | None:
