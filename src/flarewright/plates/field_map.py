@@ -15,7 +15,15 @@ from scipy.interpolate import CubicSpline, RectBivariateSpline
 
 from ..errors import ProjectError
 from ..model import Light
-from ..render.scene.pixel_place import DirectImages, direct_images, field_angles_at, image_px
+from ..render.scene.pixel_place import (
+    DirectImages,
+    angle_of,
+    direct_images,
+    field_angles_at,
+    field_deg_of,
+    image_px,
+    last_lit,
+)
 from ..render.scene.resolve import ResolvedProject
 from ..typing import Floats
 
@@ -138,12 +146,7 @@ def _last_angle(images: DirectImages, radius_px: float) -> float:
     try:
         return float(np.radians(field_angles_at(images, (float(column + radius_px), float(row)))[0]))
     except ProjectError:
-        low, high = 0.0, _STEEPEST
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            lit = image_px(images, (float(np.degrees(middle)), 0.0)) is not None
-            low, high = (middle, high) if lit else (low, middle)
-        return low
+        return last_lit(images, np.array([1.0, 0.0]), _STEEPEST, _HALVINGS)
 
 
 def _over_grid(images: DirectImages) -> Callable[[Floats], Floats]:
@@ -160,16 +163,14 @@ def _over_grid(images: DirectImages) -> Callable[[Floats], Floats]:
     for i, j in order:
         inner = tuple(k + int(np.sign(_SIDE // 2 - k)) for k in (i, j))
         near = traced[inner]
-        start = None if np.isnan(near).any() else _field_deg(near)
+        start = None if np.isnan(near).any() else field_deg_of(near)
         try:
             x, y = field_angles_at(images, (float(sides[0][i]), float(sides[1][j])), start)
         except ProjectError:
             continue
         there = image_px(images, (x, y))
         assert there is not None, "an inverse is traced"
-        slope = np.tan(np.radians([x, y]))
-        size = float(np.hypot(*slope))
-        traced[i, j] = slope * (np.arctan(size) / size if size > 0.0 else 1.0)
+        traced[i, j] = angle_of(np.tan(np.radians([x, y])))
         # the miss of the inverse, paraxially
         traced[i, j] += (np.array([sides[0][i], sides[1][j]]) - there) / per_radian
     known = np.isfinite(traced[..., 0])
@@ -185,12 +186,6 @@ def _over_grid(images: DirectImages) -> Callable[[Floats], Floats]:
         return found
 
     return angles_of
-
-
-def _field_deg(angle: Floats) -> tuple[float, float]:
-    theta = float(np.hypot(*angle))
-    x, y = np.degrees(np.arctan(angle * (np.tan(theta) / theta if theta > 0.0 else 1.0)))
-    return float(x), float(y)
 
 
 def _continued(values: Floats, known: Floats, sides: list[Floats]) -> Floats:

@@ -57,22 +57,19 @@ def direct_image(lens: Lens, shot: Shot) -> DirectImage:
     DirectImage
         Dark (zeros at the ideal position) if the lens passes no light at that angle.
     """
-    path, tilt, axes = direct_path(lens), shot.incidence.tilt, shot.incidence.axes
-    packed, opening = shot.packed, shot.opening
+    packed = shot.packed
     count = len(packed.wavelengths_nm)
     middle = (count - 1) // 2
-    ideal = -packed.first_order.efl * np.tan(tilt) * axes[1]
+    ideal = -packed.first_order.efl * np.tan(shot.incidence.tilt) * shot.incidence.axes[1]
     place, mean = (float(ideal[0]), float(ideal[1])), 0.0
-    region = find_region(packed, path, tilt, opening.radius)
-    if region is None:
+    bundle = _direct_bundle(lens, shot)
+    if bundle is None:
         return DirectImage(np.zeros(count), place, mean)
-    bundle = trace_grid(packed, path, tilt, (opening.radius, opening.inner), region, Refinement(_SCALE))
     flux = np.zeros(count)
     for w in range(count):
-        data = trace_bundle(packed, w, bundle, tilt)
-        sums = measure_bundle(data, bundle.pupil, bundle.triangles, 1, opening.blades, axes, bundle.halves)
+        data, sums = _measured(shot, bundle, w)
         flux[w] = sums[0] * shot.incidence.cosine
-        if opening.mask is not None and sums[0] > 0.0:
+        if shot.opening.mask is not None and sums[0] > 0.0:
             flux[w] = _through_mask(shot, bundle, data, sums)
         if w == middle and sums[0] > 0.0:
             place, mean = (float(sums[1] / sums[0]), float(sums[2] / sums[0])), float(sums[0] / sums[4])
@@ -92,15 +89,28 @@ def direct_place(lens: Lens, shot: Shot) -> tuple[float, float] | None:
     tuple of float or None
         Millimetres right and up of the axis in the upright picture; None if the lens passes no light at that angle.
     """
-    path, tilt, opening, packed = direct_path(lens), shot.incidence.tilt, shot.opening, shot.packed
-    region = find_region(packed, path, tilt, opening.radius)
+    # on another grid the centroid differs by a fraction of a pixel
+    bundle = _direct_bundle(lens, shot)
+    if bundle is None:
+        return None
+    _, sums = _measured(shot, bundle, (len(shot.packed.wavelengths_nm) - 1) // 2)
+    return (float(sums[1] / sums[0]), float(sums[2] / sums[0])) if sums[0] > 0.0 else None
+
+
+def _direct_bundle(lens: Lens, shot: Shot) -> Bundle | None:
+    """Return the rays of the direct path; None if the lens passes no light at that angle."""
+    path, tilt, opening = direct_path(lens), shot.incidence.tilt, shot.opening
+    region = find_region(shot.packed, path, tilt, opening.radius)
     if region is None:
         return None
-    # the same grid as `direct_image`: on another one the centroid differs by a fraction of a pixel
-    bundle = trace_grid(packed, path, tilt, (opening.radius, opening.inner), region, Refinement(_SCALE))
-    data = trace_bundle(packed, (len(packed.wavelengths_nm) - 1) // 2, bundle, tilt)
-    sums = measure_bundle(data, bundle.pupil, bundle.triangles, 1, opening.blades, shot.incidence.axes, bundle.halves)
-    return (float(sums[1] / sums[0]), float(sums[2] / sums[0])) if sums[0] > 0.0 else None
+    return trace_grid(shot.packed, path, tilt, (opening.radius, opening.inner), region, Refinement(_SCALE))
+
+
+def _measured(shot: Shot, bundle: Bundle, w: int) -> tuple[Floats, Floats]:
+    """Return the traced rays of a bundle at a wavelength, and the sums of `measure_bundle` over their light."""
+    data = trace_bundle(shot.packed, w, bundle, shot.incidence.tilt)
+    axes, blades = shot.incidence.axes, shot.opening.blades
+    return data, measure_bundle(data, bundle.pupil, bundle.triangles, 1, blades, axes, bundle.halves)
 
 
 def _through_mask(shot: Shot, bundle: Bundle, data: Floats, sums: Floats) -> float:

@@ -17,7 +17,7 @@ from .resolve import ResolvedProject
 from .shot import Shot, moved
 from .shots import make_shots
 
-__all__ = ["DirectImages", "direct_images", "field_angles_at", "image_px"]
+__all__ = ["DirectImages", "angle_of", "direct_images", "field_angles_at", "field_deg_of", "image_px", "last_lit"]
 
 # pixels that a place found may miss the wanted one; drawing needs 0.1
 TOLERANCE_PX = 0.02
@@ -136,10 +136,9 @@ def field_angles_at(
     if near_deg is not None:
         starts.insert(0, np.tan(np.radians(near_deg)))
     for start in starts:
-        found = _search(images, np.array(place_px), _angle_of(start), pixels)
+        found = _search(images, np.array(place_px), angle_of(start), pixels)
         if found is not None:
-            x, y = np.degrees(np.arctan(_slope_of(found)))
-            return float(x), float(y)
+            return field_deg_of(found)
     raise ProjectError(_beyond(images, place_px))
 
 
@@ -183,21 +182,30 @@ def _search(images: DirectImages, target: Floats, start: Floats, pixels: Floats)
 
 def _traced(images: DirectImages, angle: Floats) -> Floats | None:
     """Return the place of an angle vector, pixels."""
-    x, y = np.degrees(np.arctan(_slope_of(angle)))
-    place = image_px(images, (float(x), float(y)))
+    place = image_px(images, field_deg_of(angle))
     return None if place is None else np.array(place)
 
 
-def _slope_of(angle: Floats) -> Floats:
-    """Return tan theta (cos phi, sin phi) of theta (cos phi, sin phi)."""
+def field_deg_of(angle: Floats) -> tuple[float, float]:
+    """Return the field angles of theta (cos phi, sin phi) in radians, the vector of an angle from the axis."""
     theta = float(np.hypot(*angle))
-    return angle * (np.tan(theta) / theta) if theta > 0.0 else angle
+    x, y = np.degrees(np.arctan(angle * (np.tan(theta) / theta) if theta > 0.0 else angle))
+    return float(x), float(y)
 
 
-def _angle_of(slope: Floats) -> Floats:
-    """Return the inverse of `_slope_of`."""
+def angle_of(slope: Floats) -> Floats:
+    """Return theta (cos phi, sin phi) in radians of tan theta (cos phi, sin phi)."""
     size = float(np.hypot(*slope))
     return slope * (np.arctan(size) / size) if size > 0.0 else slope
+
+
+def last_lit(images: DirectImages, towards: Floats, steepest: float, halvings: int) -> float:
+    """Return the last angle from the axis, radians, at which the lens images a light in a direction of the picture."""
+    lit, dark = 0.0, steepest
+    for _ in range(halvings):
+        middle = 0.5 * (lit + dark)
+        lit, dark = (middle, dark) if _traced(images, middle * towards) is not None else (lit, middle)
+    return lit
 
 
 def _beyond(images: DirectImages, place_px: tuple[float, float]) -> str:
@@ -206,10 +214,7 @@ def _beyond(images: DirectImages, place_px: tuple[float, float]) -> str:
     wanted = (np.array(place_px) - [column, row]) / ([across, -down] * np.array(images.squeezed))
     azimuth = float(np.arctan2(wanted[1], wanted[0]))
     towards = np.array([cos(azimuth), sin(azimuth)])
-    lit, dark = 0.0, LARGEST_ANGLE
-    for _ in range(HALVINGS):
-        middle = 0.5 * (lit + dark)
-        lit, dark = (middle, dark) if _traced(images, middle * towards) is not None else (lit, middle)
+    lit = last_lit(images, towards, LARGEST_ANGLE, HALVINGS)
     last = _traced(images, lit * towards)
     reach = 0.0 if last is None else float(np.hypot(*(last - [column, row])))
     far = float(np.hypot(*(np.array(place_px) - [column, row])))
