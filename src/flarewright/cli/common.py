@@ -221,12 +221,9 @@ def chosen_fstop(f_number: float | None) -> float | None:
 
 def write_text(output: Path, text: str) -> None:
     """Write a text file in UTF-8, atomically."""
-    from ..io.files.atomic_write import write_atomically
+    from ..io.files.atomic_write import write_text_atomically
 
-    def write(temporary: Path) -> None:
-        temporary.write_text(text, "utf-8")
-
-    write_atomically(output, write)
+    write_text_atomically(output, text)
 
 
 @contextmanager

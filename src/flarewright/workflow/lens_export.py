@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import LensError
-from ..io.files.atomic_write import write_atomically
+from ..io.files.atomic_write import write_text_atomically
 from ..io.lens.formats.optiland import optiland_text
 from ..io.lens.formats.table_writer import csv_text, dotlens_text
 from ..io.lens.lens_writer import write_lens
@@ -46,7 +46,7 @@ def export_lens(lens: Lens, path: Path) -> tuple[str, ...]:
         text, found = _text(lens, suffix)
     except LensError as error:
         raise LensError(f"{lens.name}: {error}") from None
-    write_atomically(path, lambda temporary: _write(temporary, text))
+    write_text_atomically(path, text, newline="\n")
     return (*remarks, *found)
 
 
@@ -105,7 +105,3 @@ def _left_out(lens: Lens, suffix: str) -> list[str]:
         if present:
             remarks.append(f"{what} left out")
     return remarks
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")

@@ -100,7 +100,7 @@ def benchmark(
     from ...design.solvers.solvers import chosen
     from ...design.thesis.figures import figure_data
     from ...design.thesis.figures import write_figures as page
-    from ...io.files.atomic_write import write_atomically
+    from ...io.files.atomic_write import write_bytes_atomically
 
     choices = [chosen(text) for text in solver or ["pools"]]
     inputs = [repr(trial), seeds, [one.label for one in choices], time_s, cpu_s, seen]
@@ -118,7 +118,7 @@ def benchmark(
         print_remarks([f"ended after {len(done)} of {seeds * len(choices)} runs, the last one cut off{again}"])
     if picture is not None:
         data = png_bytes(np.concatenate(done[-1][1:], axis=1))
-        write_atomically(picture, lambda temporary: _write(temporary, data))
+        write_bytes_atomically(picture, data)
         print_remarks([f"wrote {picture}: the target, and what was found"])
     if report is not None:
         write_text(report, page(trial, runs, _best_pictures(trial, done)))
@@ -265,7 +265,3 @@ def _progress_display() -> Iterator[Report | None]:
 
     with Status("searching", console=Console(stderr=True)) as status:
         yield status.update
-
-
-def _write(path: Path, data: bytes) -> None:
-    path.write_bytes(data)

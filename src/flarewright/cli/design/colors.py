@@ -165,13 +165,13 @@ def _draw_map(output: Path, problem: ColorProblem, ghost: str) -> str:
 
     from ...design.coatings.colors import pair_map
     from ...design.problem.grey_picture import png_bytes
-    from ...io.files.atomic_write import write_atomically
+    from ...io.files.atomic_write import write_bytes_atomically
 
     path = output.with_name(f"{output.stem}.{ghost}.png")
     j, _, i = ghost.partition("-")
     picture = pair_map(problem.n_d, (int(j), int(i)), problem.bounds)
     data = png_bytes(np.repeat(np.repeat(picture, 2, axis=0), 2, axis=1))
-    write_atomically(path, lambda temporary: _write(temporary, data))
+    write_bytes_atomically(path, data)
     return f"wrote {path}: first mirror upwards, second to the right, centre wavelengths in 2 nm steps"
 
 
@@ -183,7 +183,3 @@ def _draw_curves(output: Path, problem: ColorProblem, row: int) -> str:
     path = output.with_name(f"{output.stem}.row-{row}.png")
     write_figure(path, channel_chart(problem.n_d, row, problem.bounds), f"quarter waves on row {row}")
     return f"wrote {path}"
-
-
-def _write(path: Path, data: bytes) -> None:
-    path.write_bytes(data)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import FlarewrightError
-from ...io.files.atomic_write import write_atomically
+from ...io.files.atomic_write import write_bytes_atomically, write_text_atomically
 from ...io.images.html_page import html_page
 from ...io.lens.lens_writer import write_lens
 from ...io.project.project_file import project_text
@@ -164,7 +164,7 @@ def write_folder(
         hued = _color_project(project, problem, one, folder / f"lens-{number}.toml")
         if hued is not None:
             path = folder / f"lens-{number}.colors.toml"
-            _write_text(path, project_text(hued, folder=folder))
+            write_text_atomically(path, project_text(hued, folder=folder), newline="\n")
             remarks.append(f"{path.name} has the target colours of lens-{number}: flarewright design colors {path}")
         pictures = found_pictures(one, problem, project)
         draft = _draft(folder / f"lens-{number}.png", one, project, remarks)
@@ -174,14 +174,14 @@ def write_folder(
     page = html_page(
         "design", title="Flarewright design", data=data, lenses=lenses, names=problem.objective.names, target=wanted
     )
-    _write_text(folder / "report.html", page)
+    write_text_atomically(folder / "report.html", page, newline="\n")
     return remarks
 
 
 def write_checkpoint(folder: Path, project: Project, state: PoolState, name: str | None = None) -> None:
     """Write what `flarewright design resume` reads; raises and parameters as `write_folder`."""
     # the search last: a folder with a search can be resumed
-    _write_text(folder / "project.toml", project_text(project, folder=folder))
+    write_text_atomically(folder / "project.toml", project_text(project, folder=folder), newline="\n")
     write_state(state, folder / "search.json", name)
 
 
@@ -246,13 +246,5 @@ def _draft(path: Path, outcome: Outcome, project: Project, remarks: list[str]) -
         remarks.append(f"{path.name} was not rendered: {error}")
         return None
     data = encode_png(view(rendering.layers[0].pixels), {})
-    write_atomically(path, lambda temporary: _write_bytes(temporary, data))
+    write_bytes_atomically(path, data)
     return data
-
-
-def _write_text(path: Path, text: str) -> None:
-    write_atomically(path, lambda temporary: _write_bytes(temporary, text.encode("utf-8")))
-
-
-def _write_bytes(path: Path, data: bytes) -> None:
-    path.write_bytes(data)

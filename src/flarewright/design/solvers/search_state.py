@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import FileError, ProjectError
-from ...io.files.atomic_write import write_atomically
+from ...io.files.atomic_write import write_text_atomically
 from ...io.files.text_file import read_json
 from ..problem.prescription import Structure
 from ..problem.problem import LensCandidate
@@ -56,7 +56,7 @@ def write_state(state: PoolState, path: Path, name: str | None = None) -> None:
         data["name"] = name
     data["digest"] = _digest(data)
     text = json.dumps(data, allow_nan=False)
-    write_atomically(path, lambda temporary: _write(temporary, text))
+    write_text_atomically(path, text)
 
 
 def read_state(path: Path) -> PoolState:
@@ -135,7 +135,3 @@ def _run(data: dict[str, Any]) -> Run:
         int(data["number"]), _structure(data), members, int(data["batches"]), int(data["searches"]),
         int(data["best_at"]),
     )  # fmt: skip
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, "utf-8")

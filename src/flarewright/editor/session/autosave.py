@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ...io.files.atomic_write import write_atomically
+from ...io.files.atomic_write import write_text_atomically
 from ...io.files.state_folder import state_folder
 from ...io.files.text_file import read_text
 from ...model import Project
@@ -84,7 +84,7 @@ def write_autosave(path: Path, saved: Saved) -> None:
     }  # fmt: skip
     text = json.dumps(data, allow_nan=False)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(path, lambda temporary: _write(temporary, f"{text}\n{_digest(text)}\n"))
+    write_text_atomically(path, f"{text}\n{_digest(text)}\n")
 
 
 def read_autosave(path: Path) -> Saved | None:
@@ -141,7 +141,3 @@ def set_aside(path: Path) -> str:
 
 def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, "utf-8")

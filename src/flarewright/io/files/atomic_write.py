@@ -67,6 +67,24 @@ def write_atomically(
             temporary.unlink(missing_ok=True)
 
 
+def write_text_atomically(path: str | Path, text: str, *, newline: str | None = None, replace: bool = True) -> None:
+    """Write a text file in UTF-8; `newline` as of `Path.write_text`, `replace` and errors as of `write_atomically`."""
+
+    def write(temporary: Path) -> None:
+        temporary.write_text(text, encoding="utf-8", newline=newline)
+
+    write_atomically(path, write, replace=replace)
+
+
+def write_bytes_atomically(path: str | Path, data: bytes) -> None:
+    """Write a file of bytes; errors as of `write_atomically`."""
+
+    def write(temporary: Path) -> None:
+        temporary.write_bytes(data)
+
+    write_atomically(path, write)
+
+
 def _place(temporary: Path, target: Path, replace: bool) -> None:
     if not replace:
         try:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files.atomic_write import write_atomically
+from ..files.atomic_write import write_text_atomically
 from .html_page import html_page
 from .png import write_png
 
@@ -64,7 +64,7 @@ def write_contact_sheet(folder: Path, title: str, figures: Sequence[Figure]) -> 
     page, picture = folder / "index.html", folder / "contact-sheet.png"
     write_png(picture, sheet_picture(figures), {"Description": title})
     text = sheet_page(title, figures)
-    write_atomically(page, lambda temporary: _write(temporary, text))
+    write_text_atomically(page, text)
     return page, picture
 
 
@@ -95,7 +95,3 @@ def sheet_picture(figures: Sequence[Figure]) -> NDArray[np.uint8]:
         sheet.paste(Image.fromarray(figure.pixels), (x, y))
         pen.text((x + 8, y + height + 4), figure.title, fill=_INK, font=font)
     return np.asarray(sheet)
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, "utf-8")

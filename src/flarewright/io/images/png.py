@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import FlarewrightError
-from ..files.atomic_write import write_atomically
+from ..files.atomic_write import write_bytes_atomically
 from ..files.door import printable
 
 # the rendering intent "perceptual" of the sRGB chunk
@@ -39,10 +39,7 @@ def write_png(path: str | PathLike[str], rgb_uint8: NDArray[np.uint8], text: Map
     """
     data = encode_png(rgb_uint8, text)
 
-    def write(temporary: Path) -> None:
-        temporary.write_bytes(data)
-
-    write_atomically(Path(path), write)
+    write_bytes_atomically(Path(path), data)
 
 
 def encode_png(rgb_uint8: NDArray[np.uint8], text: Mapping[str, str]) -> bytes:

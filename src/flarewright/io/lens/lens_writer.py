@@ -8,7 +8,7 @@ from pathlib import Path
 from flarewright.model import Coating, Lens, Row, Stop
 from flarewright.model.lens.iris import Iris
 
-from ..files.atomic_write import write_atomically
+from ..files.atomic_write import write_text_atomically
 from .coating_text import UNCOATED, format_coating
 from .lens_fields import TOP_NUMBERS, TOP_TEXTS
 from .scatter_text import scatter_lines
@@ -29,7 +29,7 @@ def write_lens(lens: Lens, path: str | Path) -> None:
         When the file cannot be written; no partial file remains.
     """
     text = format_lens(lens)
-    write_atomically(path, lambda temporary: _write(temporary, text))
+    write_text_atomically(path, text, newline="\n")
 
 
 def format_lens(lens: Lens) -> str:
@@ -145,7 +145,3 @@ def _text(text: str) -> str:
 def _quoted(text: str) -> str:
     # JSON's escapes are those of TOML except for DEL
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")

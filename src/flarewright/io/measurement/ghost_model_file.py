@@ -13,7 +13,7 @@ from ...model.measurement.corrections import Corrections
 from ...model.measurement.ghost_model import GhostModel
 from ...model.measurement.ghost_tracks import Tracks
 from ...model.measurement.replay_camera import ReplayCamera
-from ..files.atomic_write import write_atomically
+from ..files.atomic_write import write_text_atomically
 from ..files.file_kind import lens_key
 from ..files.sentences import summary
 from ..files.text_file import LARGEST, check_version, read_json
@@ -108,7 +108,4 @@ def _write(path: str | Path, record: Frozen) -> None:
     # arrays of numbers on one line each
     text = _NUMBERS.sub(lambda found: f"[{', '.join(found[1].replace(',', ' ').split())}]", text)
 
-    def write(part: Path) -> None:
-        part.write_text(text + "\n", encoding="utf-8")
-
-    write_atomically(path, write)
+    write_text_atomically(path, text + "\n")

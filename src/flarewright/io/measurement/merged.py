@@ -13,7 +13,7 @@ import numpy as np
 from ...errors import FileError, FlarewrightError, OutputError
 from ...model.layer import Layer
 from ...model.measurement.capture import FrameInfo, MergedFrame, MergedRun
-from ..files.atomic_write import write_atomically
+from ..files.atomic_write import write_text_atomically
 from ..files.sentences import summary
 from ..files.text_file import read_json
 from ..files.type_slips import record_of
@@ -100,10 +100,7 @@ def write_run(folder: Path, run: MergedRun) -> None:
     """
     text = run.model_dump_json(indent=1) + "\n"
 
-    def write(temporary: Path) -> None:
-        temporary.write_text(text, "utf-8")
-
-    write_atomically(folder / INDEX, write)
+    write_text_atomically(folder / INDEX, text)
 
 
 def read_run(folder: Path) -> MergedRun:

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..._version import __version__
 from ...errors import FileError, OutputError
-from ...io.files.atomic_write import write_atomically
+from ...io.files.atomic_write import write_text_atomically
 from ...io.files.door import outside
 from ...model.base import Frozen
 from ...model.measurement.ghost_model import Blades
@@ -134,11 +134,8 @@ def journal(path: Path, digest: str) -> Iterator[Journal]:
     known = _read(path, head)
     text = "".join(_line(one) for one in (head, *known))
 
-    def write(temporary: Path) -> None:
-        temporary.write_text(text, "utf-8")
-
     # rewrite the file without a last line that an interruption cut short
-    write_atomically(path, write)
+    write_text_atomically(path, text)
     try:
         file = path.open("a", encoding="utf-8")
     except OSError as error:

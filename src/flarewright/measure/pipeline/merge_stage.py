@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import FileError, FlarewrightError, OutputError
-from ...io.files.atomic_write import write_atomically
+from ...io.files.atomic_write import write_text_atomically
 from ...io.files.sentences import count
 from ...io.files.text_file import digest_of, read_json
 from ...io.images.photo import open_photo
@@ -260,7 +260,7 @@ def _frame(
         "digest": digest, "sha256": digest_of(output / file), "sighting": asdict(sighting),
         "ratios": [asdict(one) for one in ratios], "from": _origin(folder, group),
     }  # fmt: skip
-    write_atomically(note, lambda temporary: _write(temporary, json.dumps(facts) + "\n"))
+    write_text_atomically(note, json.dumps(facts) + "\n")
     return _Merged(file, group, sighting, sighting.clipped_share)
 
 
@@ -287,10 +287,6 @@ def _with_given_light(
 
 def _white_of(known: CameraCalibration) -> float | None:
     return known.white if np.isfinite(known.white) else None
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, "utf-8")
 
 
 def _digest(facts: Any) -> str:

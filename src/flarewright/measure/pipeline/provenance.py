@@ -10,7 +10,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from ...errors import FileError, FlarewrightError
-from ...io.files.atomic_write import write_atomically
+from ...io.files.atomic_write import write_text_atomically
 from ...io.files.text_file import read_json
 from ...model.measurement.capture import OF_LIGHT, MergedRun
 from ...model.measurement.corrections import Corrections
@@ -63,10 +63,7 @@ def note(folder: Path, stage: str, digest: str) -> None:
     """
     text = json.dumps({**_read_notes(folder), stage: digest}, indent=1) + "\n"
 
-    def write(temporary: Path) -> None:
-        temporary.write_text(text, "utf-8")
-
-    write_atomically(folder / NOTES, write)
+    write_text_atomically(folder / NOTES, text)
 
 
 def noted(folder: Path, key: str) -> str | None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import FlarewrightError
-from ...io.files.atomic_write import write_atomically
+from ...io.files.atomic_write import write_text_atomically
 from ...io.files.sentences import count
 from ...io.files.text_file import read_json
 from ...io.images.html_page import html_page
@@ -97,10 +97,7 @@ def write_report(
         geometry=_geometry(run), sections=sections,
     )  # fmt: skip
 
-    def write(temporary: Path) -> None:
-        temporary.write_text(text, "utf-8")
-
-    write_atomically(path, write)
+    write_text_atomically(path, text)
 
 
 def strange(run: MergedRun, model: GhostModel) -> str | None:

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...io.files.atomic_write import write_atomically
+from ...io.files.atomic_write import write_text_atomically
 from ...io.images.png import png_address, write_png
 
 INK, FAINT, PAPER = "#22313f", "#8796a5", "#fbfcfd"
@@ -106,13 +106,9 @@ def write_figure(path: Path, figure: Chart, about: str) -> None:
         The file cannot be written.
     """
     if path.suffix.lower() == ".svg":
-        write_atomically(path, lambda temporary: _write_text(temporary, to_svg(figure)))
+        write_text_atomically(path, to_svg(figure))
     else:
         write_png(path, chart_pixels(figure), {"Software": about, "Title": figure.title})
-
-
-def _write_text(path: Path, text: str) -> None:
-    path.write_text(text, "utf-8")
 
 
 def to_svg(figure: Chart) -> str:

@@ -13,7 +13,7 @@ from shutil import copyfile
 from typing import IO
 
 from ...errors import FlarewrightError, LensError, OutputError, ProjectError
-from ...io.files.atomic_write import write_atomically
+from ...io.files.atomic_write import write_atomically, write_text_atomically
 from ...io.files.door import sentences_for, shown
 from ...io.files.text_file import digest_of
 from ...io.images.mask_image import read_mask
@@ -277,7 +277,7 @@ class _Names:
                 named = replace(record, name=unused_name(wanted, self._keys))
                 path = lenses_folder() / f"{named.name}.toml"
                 try:
-                    write_atomically(path, partial(_write, text=with_record(text, named)), replace=False)
+                    write_text_atomically(path, with_record(text, named), newline="\n", replace=False)
                 except FileExistsError:
                     # copied there by hand meanwhile
                     self._keys.add(key_of(named.name))
@@ -304,10 +304,6 @@ class _Names:
         self._keys.add(key_of(record.name))
         if record.digest:
             self._by_digest[record.digest] = record.name
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")
 
 
 __all__ = ["Addition", "Refused", "add_lenses"]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import FileError, FlarewrightError, OutputError
-from ...io.files.atomic_write import write_atomically
+from ...io.files.atomic_write import write_bytes_atomically
 from ...io.files.tar_members import members, tar_member
 from ...io.files.text_file import read_bytes
 from ...jobs.worker import WRITING
@@ -168,8 +168,5 @@ def _write(path: Path, data: bytes) -> None:
     except OSError as error:
         raise OutputError(f"cannot make the folder {path.parent} ({(error.strerror or str(error)).lower()})") from None
 
-    def write(temporary: Path) -> None:
-        temporary.write_bytes(data)
-
     with WRITING:
-        write_atomically(path, write)
+        write_bytes_atomically(path, data)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..._version import __version__
 from ...errors import FileError, OutputError, ProjectError
-from ...io.files.atomic_write import write_atomically
+from ...io.files.atomic_write import write_atomically, write_bytes_atomically, write_text_atomically
 from ...io.files.tar_members import join_parts
 from ...io.files.text_file import digest_of, read_bytes, read_json
 from ...io.project.dataset_file import contradictions, read_dataset_spec
@@ -244,11 +244,7 @@ def _claim(plan: DatasetPlan, items: int) -> None:
         "splits": splits_of(spec), "spec": spec.model_dump(mode="json"),
     }  # fmt: skip
     text = json.dumps(data, indent=2) + "\n"
-    write_atomically(about, lambda temporary: _text(temporary, text))
-
-
-def _text(path: Path, text: str) -> None:
-    path.write_text(text, "utf-8")
+    write_text_atomically(about, text)
 
 
 def _held(about: Path) -> dict[str, Any] | None:
@@ -305,7 +301,8 @@ def _pack(plan: DatasetPlan, unit: range) -> None:
     """Join the finished items of a tar file, and remove them."""
     for split, indices in _by_split(plan.spec, unit).items():
         lines = [item_record(plan, index, split) for index in indices]
-        _write_lines(_shard(plan, unit, split, "jsonl"), [line for line in lines if line is not None])
+        kept = b"".join(line for line in lines if line is not None)
+        write_bytes_atomically(_shard(plan, unit, split, "jsonl"), kept)
         join_parts(_shard(plan, unit, split, "tar"), [fragment(plan, index) for index in indices])
     _remove_fragments(plan, unit)
 
@@ -318,13 +315,6 @@ def _remove_fragments(plan: DatasetPlan, unit: range) -> None:
         fragment(plan, index).unlink(missing_ok=True)
     with suppress(OSError):
         plan.staging.rmdir()
-
-
-def _write_lines(path: Path, lines: Sequence[bytes]) -> None:
-    def write(temporary: Path) -> None:
-        temporary.write_bytes(b"".join(lines))
-
-    write_atomically(path, write)
 
 
 def _records(path: Path) -> Iterator[tuple[bytes, dict[str, Any]]]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from flarewright.errors import FileError
 
-from ...files.atomic_write import write_atomically
+from ...files.atomic_write import write_text_atomically
 from ...files.text_file import read_json
 from .folder import library_folder
 from .record import LensRecord, as_json, from_json
@@ -78,11 +78,7 @@ def write_index(entries: dict[str, Entry]) -> None:
     """
     lenses = {name: [entry.size, entry.changed_ns, as_json(entry.record)] for name, entry in sorted(entries.items())}
     text = json.dumps({"version": _VERSION, "lenses": lenses})
-    write_atomically(index_path(), lambda temporary: _write(temporary, text))
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")
+    write_text_atomically(index_path(), text, newline="\n")
 
 
 __all__ = ["Entry", "Index", "index_path", "read_index", "write_index"]
