@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import resource
+import signal
 import time
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 
@@ -32,6 +35,8 @@ class Tried:
 
 
 def _work(pipe: Connection) -> None:
+    # a killed worker closes nothing: editors and browsers that it started end with its group
+    os.setpgrp()
     # a browser, which needs more, lifts the limit
     resource.setrlimit(resource.RLIMIT_AS, (SPACE, resource.getrlimit(resource.RLIMIT_AS)[1]))
     while True:
@@ -89,6 +94,9 @@ class Worker:
     def stop(self) -> None:
         """End the process."""
         if self._process is not None:
+            assert self._process.pid is not None, "it is started"
+            with suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGKILL)
             self._process.kill()
             self._process.join()
             self._pipe.close()
