@@ -13,11 +13,11 @@ from ...errors import FlarewrightError, ProjectError
 from ...model.project import dataset as records
 from ...model.project import distribution as distributions
 from ...model.project.dataset import DatasetSpec
-from ..files.file_kind import refuse_lens_suffix, refuse_other_kind
 from ..files.sentences import summary
-from ..files.text_file import check_version, read_toml
+from ..files.text_file import check_version
 from ..files.type_slips import record_of
 from ..lens.coating_text import parse_coating_choice
+from .file_of_kind import read_file_of_kind
 from .project_file import ProjectFileError, Sections, lens_location, validation_messages
 
 _NEWEST = 1
@@ -132,12 +132,7 @@ def read_dataset_spec(path: str | os.PathLike[str]) -> DatasetSpec:
     >>> spec = read_dataset_spec("pairs.toml")                                          # doctest: +SKIP
     """
     path = Path(path)
-    try:
-        refuse_lens_suffix(path, "dataset")
-        data = read_toml(path, "a specification of a data set")
-        refuse_other_kind(path, data, "dataset")
-    except ValueError as error:
-        raise ProjectError(str(error)) from None
+    data = read_file_of_kind(path, "dataset", "a specification of a data set")
     return dataset_from_data(data, folder=path.parent, where=str(path))
 
 

@@ -37,13 +37,13 @@ from ...model.project import starburst as starbursts
 from ...model.project.camera import Camera
 from ...model.project.holdout import Holdout
 from ...model.project.project import Output, Project, Quality
-from ..files.file_kind import refuse_lens_suffix, refuse_other_kind
 from ..files.sentences import Keys, did_you_mean, shorten, summary, validation_sentences
-from ..files.text_file import check_version, read_toml
+from ..files.text_file import check_version
 from ..files.type_slips import record_of
 from ..lens.coating_text import coating_from, parse_coating, parse_coating_choice
 from ..lens.plate_text import parse_plate
 from ..lens.toml_lens import lens_from_table
+from .file_of_kind import read_file_of_kind
 from .project_text import ABOUT, FILES, HOLDOUT_FILES, lens_location, project_text
 from .spectrum_text import parse_spectrum
 
@@ -101,10 +101,8 @@ def read_project(path: str | os.PathLike[str]) -> Project:
         When the file cannot be read or has errors; `problems` then lists all of them.
     """
     path = Path(path)
+    data = read_file_of_kind(path, "project", "a project file")
     try:
-        refuse_lens_suffix(path, "project")
-        data = read_toml(path, "a project file")
-        refuse_other_kind(path, data, "project")
         check_version(data, _NEWEST, f"the project file {path}")
     except ValueError as error:
         raise ProjectError(str(error)) from None

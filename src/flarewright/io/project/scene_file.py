@@ -15,10 +15,10 @@ from ...model.project import light as spectra
 from ...model.project import project as choices
 from ...model.project import scene as records
 from ...model.project.scene import Scene
-from ..files.file_kind import refuse_lens_suffix, refuse_other_kind
 from ..files.sentences import shorten, summary
-from ..files.text_file import check_version, read_toml
+from ..files.text_file import check_version
 from ..files.type_slips import record_of
+from .file_of_kind import read_file_of_kind
 from .project_file import (
     ProjectFileError,
     Sections,
@@ -115,12 +115,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
         When the file cannot be read or has errors; `problems` then lists all of them, each with its place.
     """
     path = Path(path)
-    try:
-        refuse_lens_suffix(path, "scene")
-        data = read_toml(path, "a scene file")
-        refuse_other_kind(path, data, "scene")
-    except ValueError as error:
-        raise ProjectError(str(error)) from None
+    data = read_file_of_kind(path, "scene", "a scene file")
     return scene_from_data(data, folder=path.parent, where=str(path))
 
 
