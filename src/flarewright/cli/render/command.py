@@ -126,7 +126,10 @@ def project_of_options(
     from .tracks import given_tracks, placed, with_given_tracks, with_lights
 
     _check_places(options, timeline)
-    base = read_project(options.project) if options.project is not None else None if state is None else state.project
+    base = None if state is None else state.project
+    if options.track and options.project is not None:
+        # `build_project` reads it again, with the flags; only tracks need its lights and its start before
+        base = read_project(options.project)
     start = (timeline or {}).get("start", 1 if base is None else base.timeline.start)
     tracked = given_tracks(options, start)
     flags = replace(options, resumed=None if state is None else state.project, tracked=tracked)
