@@ -77,8 +77,8 @@ def test_a_long_name_leaves_the_numbers_whole(capsys):
     print_records([record])
     lines = capsys.readouterr().out.splitlines()
     row = next(line for line in lines if record.name in line)
-    told = (record.name, "103.0-388.0", "4.13", "6.0", "41", record.maker, record.patent, record.title)
-    assert tuple(cell.strip() for cell in row.strip("\u2502").split("\u2502")) == told
+    expected = (record.name, "103.0-388.0", "4.13", "6.0", "41", record.maker, record.patent, record.title)
+    assert tuple(cell.strip() for cell in row.strip("\u2502").split("\u2502")) == expected
 
 
 @pytest.mark.parametrize(
