@@ -443,21 +443,20 @@ def spike_profile(
     end = 24.0 * wide + 12.0 * span
     step = max(narrow / 6.0, span / 48.0)
     v = np.asarray(np.arange(math.ceil(end / step) + 2) * step, dtype=np.float64)
-    # an FFT needs step * dq = 1 / a power of two; the period 1 / dq lies far beyond the table
-    period = 2 ** math.ceil(math.log2(16 * len(v)))
+    # an FFT needs step * dq = 1 / a power of two, and repeats its sums with the period 1 / dq. A pixel that is wider than
+    # the fringes shows none of the light from other periods but its mean, which is known
+    period = 2 ** math.ceil(math.log2((4 if span > 4.0 * wide else 16) * len(v)))
     dq = 1.0 / (period * step)
     q = np.arange(math.ceil(1.0 / narrow / dq) + 1) * dq
-    triangle = np.maximum(1.0 - q[:, None] * lam / length, 0.0) * (lam / length)
-    F = (triangle @ W) * (2.0 * dq)
+    F = _triangles(q, lam / length, W) * (2.0 * dq)
     F[0] *= 0.5
     tail = (lam**2 @ W) / (2.0 * math.pi**2 * length**2)
     half_total = 0.5 * (lam / length) @ W
     fade = np.clip(2.0 * v / v[-1] - 1.0, 0.0, 1.0)[:, None]
     far = np.maximum(v, step)[:, None]
-    shadow = np.sinc(sides[0] * np.outer(q, np.sin(wings.angle))) * np.sinc(sides[1] * np.outer(q, np.cos(wings.angle)))
-    seen = (shadow[:, :, None] * F[:, None, :]).reshape(len(q), -1)
-    shape = (len(v), len(wings.angle), weights.shape[1])
-    cumulative, density = (table.reshape(shape).swapaxes(0, 1) for table in _transform(v, q, seen, period))
+    sums = _transform(v, q, F, [(sides[0] * math.sin(a), sides[1] * math.cos(a)) for a in wings.angle], period)
+    repeated = zip(sums, _repeated_tail(v, period * step), strict=True)
+    cumulative, density = (table - tail * others[:, None] for table, others in repeated)
     return SpikeProfile(
         np.ascontiguousarray((1.0 - fade) * cumulative + fade * (half_total - tail / far)),
         np.ascontiguousarray((1.0 - fade) * density + fade * tail / far**2),
@@ -467,20 +466,52 @@ def spike_profile(
     )
 
 
-def _transform(v: Floats, q: Floats, spectra: Floats, period: int) -> tuple[Floats, Floats]:
-    """Return the sums of spectra (Q, S) times sin(2 pi q v) / (2 pi q), and times cos(2 pi q v): (V, S) each.
+def _triangles(q: Floats, widths: Floats, weights: Floats) -> Floats:
+    """Return the sums of max(1 - q t, 0) t w over widths t (M,) and weights w (M, C) at rising q (Q,): (Q, C)."""
+    order = np.argsort(widths)
+    t, w = widths[order, None], weights[order]
+    none = np.zeros((1, weights.shape[1]))
+    first, second = (np.concatenate([none, np.cumsum(t**power * w, axis=0)]) for power in (1, 2))
+    with np.errstate(divide="ignore"):
+        lit = np.searchsorted(t[:, 0], 1.0 / q)
+    summed: Floats = first[lit] - q[:, None] * second[lit]
+    return summed
 
-    Both grids are even and start at 0, and the product of their steps is 1 / period, so both sums are FFTs.
+
+def _repeated_tail(v: Floats, period: float) -> tuple[Floats, Floats]:
+    """Return what tails 1 / (v - k period)^2 of all k but 0 add up to at v, integrated from 0 on, and itself.
+
+    The sum over all k is (pi / period)^2 / sin^2(pi v / period).
     """
-    over_q = spectra.copy()
-    over_q[1:] /= 2.0 * math.pi * q[1:, None]
-    over_q[0] = 0.0
-    folded = []
-    for columns in (over_q, spectra):
-        # terms a whole period apart have the same phases
-        padded = np.zeros((-(-len(q) // period) * period, columns.shape[1]))
-        padded[: len(q)] = columns
-        sums = padded.reshape(-1, period, columns.shape[1]).sum(axis=0)
-        folded.append(np.fft.rfft(sums, axis=0)[: len(v)])
-    # sin(2 pi q v) / (2 pi q) tends to v at q = 0
-    return v[:, None] * spectra[0] - folded[0].imag, folded[1].real
+    x = math.pi / period * v
+    near = x < 0.05
+    safe = np.where(near, 1.0, x)
+    total = np.where(near, x / 3.0 + x**3 / 45.0, 1.0 / safe - 1.0 / np.tan(safe))
+    itself = np.where(near, 1.0 / 3.0 + x**2 / 15.0, np.sin(safe) ** -2 - safe**-2)
+    return math.pi / period * total, (math.pi / period) ** 2 * itself
+
+
+def _transform(
+    v: Floats, q: Floats, spectrum: Floats, boxes: list[tuple[float, float]], period: int
+) -> tuple[Floats, Floats]:
+    """Sum a spectrum (Q, C) times sin(2 pi q v) / (2 pi q), and times cos(2 pi q v), averaged over D pairs of boxes.
+
+    The tables have the shape (D, V, C). Both grids are even and start at 0, and the product of their steps is
+    1 / period, so the sums are FFTs. Terms a whole period apart have the same phases.
+    """
+    folds = -(-len(q) // period)
+    padded = np.zeros((folds * period, spectrum.shape[1]))
+    padded[: len(q)] = spectrum
+    at = np.arange(len(padded)) * q[1]
+    over = np.zeros(len(padded))
+    over[1:] = 0.5 / (math.pi * at[1:])
+    integrals = np.empty((len(boxes), len(v), spectrum.shape[1]))
+    values = np.empty_like(integrals)
+    for n, (one, other) in enumerate(boxes):
+        seen = (np.sinc(one * at) * np.sinc(other * at))[:, None] * padded
+        both = np.concatenate([seen * over[:, None], seen], axis=1)
+        summed = np.fft.rfft(both.reshape(folds, period, -1).sum(axis=0), axis=0)[: len(v)]
+        # sin(2 pi q v) / (2 pi q) tends to v at q = 0
+        integrals[n] = v[:, None] * seen[0] - summed[:, : spectrum.shape[1]].imag
+        values[n] = summed[:, spectrum.shape[1] :].real
+    return integrals, values
