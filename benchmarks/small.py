@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from benchmarks.yardstick import trace_plainly
 
+from benchmarks.yardstick import trace_plainly
 from flarewright import ghosts
 from flarewright.model import Bare, Camera, Everywhere, Iris, Light, Output, Project, Quality, Scatter, Standard
 from flarewright.optics.lens.paths import ghost_paths

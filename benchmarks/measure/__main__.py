@@ -28,7 +28,6 @@ from benchmarks.measure.planted import planted_time
 from benchmarks.measure.rolled import judge_rolled, shoot_rolled
 from benchmarks.measure.shoot import setup_of, shoot
 from benchmarks.measure.speed import replay_speed
-
 from flarewright.io.measurement.captures import read_camera, read_captures
 from flarewright.io.measurement.ghost_model_file import write_ghost_model
 from flarewright.io.measurement.merged import read_run

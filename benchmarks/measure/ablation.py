@@ -26,13 +26,13 @@ from typing import Any, cast
 from unittest import mock
 
 import numpy as np
+from numpy.typing import NDArray
+from synthetic_camera import Setup, ideal_frame, poses, scale_of, truth_of
+
 from benchmarks.measure.judge import far_from
 from benchmarks.measure.optical_flow import between
 from benchmarks.measure.rolled import turned_photograph
 from benchmarks.measure.shoot import run_of, setup_of
-from numpy.typing import NDArray
-from synthetic_camera import Setup, ideal_frame, poses, scale_of, truth_of
-
 from flarewright.io.measurement.merged import write_frame
 from flarewright.measure.core.views import View, views_of
 from flarewright.measure.pipeline.find_stage import find_ghosts

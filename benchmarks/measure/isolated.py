@@ -15,12 +15,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from benchmarks.measure.shoot import setup_of
-from benchmarks.measure.truth import cut_by_frame, footprint, forms_of
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from synthetic_camera import Pose, Setup, ghost_layers, poses, project_of, scale_of
 
+from benchmarks.measure.shoot import setup_of
+from benchmarks.measure.truth import cut_by_frame, footprint, forms_of
 from flarewright.kernels.ghost_model.bezier import BORDER, INNER
 from flarewright.kernels.ghost_model.pupil_mesh import FIRST_DISC, FIRST_I
 from flarewright.measure.compression.order_selection import can_go

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from benchmarks.measure.shoot import read_ghosts, read_poses, read_truth
-from benchmarks.measure.truth import TrueGhost, footprint
 from numpy.typing import NDArray
 
+from benchmarks.measure.shoot import read_ghosts, read_poses, read_truth
+from benchmarks.measure.truth import TrueGhost, footprint
 from flarewright.io.measurement.merged import read_frame
 from flarewright.measure.glow.laws import offsets
 from flarewright.measure.replay.model_image import draw, replay_model

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from benchmarks.measure.judge import far_from
 from numpy.typing import NDArray
 from synthetic_camera import Setup, poses, scale_of, truth_of
 
+from benchmarks.measure.judge import far_from
 from flarewright.io.measurement.merged import read_frame
 from flarewright.measure.replay.model_image import replay_model
 from flarewright.measure.replay.sprites import samples

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from benchmarks.measure.truth import TrueGhost, true_ghosts
 from numpy.typing import NDArray
 from synthetic_camera import Setup, expose, ideal_frame, poses, scale_of, truth_of
 
+from benchmarks.measure.truth import TrueGhost, true_ghosts
 from flarewright.io.measurement.merged import write_frame, write_run
 from flarewright.model.measurement.capture import CameraNoise, FrameInfo, MergedRun
 

@@ -21,11 +21,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from benchmarks.measure.shoot import setup_of
-from benchmarks.measure.truth import project_of, rays_of
 from numpy.typing import NDArray
 from synthetic_camera import Setup, poses
 
+from benchmarks.measure.shoot import setup_of
+from benchmarks.measure.truth import project_of, rays_of
 from flarewright.measure.core.parameter_vector import field, ten_terms
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.render.scene.opening import make_opening

@@ -123,13 +123,15 @@ def _disc(light: Light) -> Floats:
     return np.asarray(rim[:, :2] / rim[:, 2:])
 
 
-def parts(light: Light, step_deg: float) -> tuple[Part, ...]:
+def parts(light: Light, step_deg: float, most: int | None = None) -> tuple[Part, ...]:
     """Divide a light into parts no wider than a step.
 
     Parameters
     ----------
     light : Light
     step_deg : float
+    most : int, optional
+        Largest number of parts from side to side and from top to bottom; a wide light then has wider parts.
 
     Returns
     -------
@@ -150,6 +152,8 @@ def parts(light: Light, step_deg: float) -> tuple[Part, ...]:
         return (Part(light.field_deg, 1.0, np.zeros((0, 2))),)
     low, high = corners.min(axis=0), corners.max(axis=0)
     counts = [max(1, ceil((high[k] - low[k]) / tan(radians(step_deg)) - 1e-9)) for k in (0, 1)]
+    if most is not None:
+        counts = [min(count, most) for count in counts]
     edges = [np.linspace(low[k], high[k], counts[k] + 1) for k in (0, 1)]
     found = []
     for a in range(counts[0]):
