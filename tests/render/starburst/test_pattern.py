@@ -181,16 +181,24 @@ def test_spike_profile_is_the_averaged_sinc():
     np.testing.assert_allclose(profile.half_total, total, rtol=1e-12)
 
 
-def test_spike_profile_is_averaged_over_the_pixel():
+@pytest.mark.parametrize(("pitch", "N"), [(0.028, 8.0), (0.3, 2.0)], ids=["fine", "coarse"])
+@pytest.mark.parametrize("lines", ["white", "lines"])
+def test_spike_profile_is_averaged_over_the_pixel(pitch, N, lines):
     wings = pupil_pattern(Iris(blades=6)).wings
-    pitch, N = 0.028, 8.0
-    profile = spike_profile(wings, WHITE_NM, WHITE, N, (pitch, pitch))
-    part = (np.arange(50) + 0.5) / 50 - 0.5
+    nm, weights = WHITE_NM, WHITE
+    if lines == "lines":
+        nm, weights = np.array([610.0, 436.0, 546.0]), np.array([[1.0, 0.2, 0.0], [0.1, 0.0, 2.0], [0.3, 1.0, 0.2]])
+    profile = spike_profile(wings, nm, weights, N, (pitch, 0.5 * pitch))
+    # the shadow of a pixel across a spike is a trapezoid: a box of its width's and a box of its height's projection
     for k, angle in enumerate(wings.angle):
-        shadow = pitch / (2 * N) * (np.sin(angle) * part[:, None] + np.cos(angle) * part).ravel()
-        for at in (0, 60, 200, 420):
-            u = wings.length * (at * profile.step + shadow) / (WHITE_NM[:, None] * 1e-6)
-            brute = wings.multiplicity * wings.length**2 / (4 * math.pi**3) * (np.sinc(u) ** 2).mean(axis=1) @ WHITE
+        wide, narrow = sorted(np.abs([pitch * np.sin(angle), 0.5 * pitch * np.cos(angle)]) / (2 * N), reverse=True)
+        span = wide + narrow
+        shift = (np.arange(6000) + 0.5) / 6000 * span - 0.5 * span
+        weight = np.clip((0.5 * span - np.abs(shift)) / max(narrow, 1e-12), 0.0, 1.0)
+        for at in (0, 60, 200):
+            u = wings.length * (at * profile.step + shift) / (nm[:, None] * 1e-6)
+            averaged = np.sinc(u) ** 2 @ weight / weight.sum()
+            brute = wings.multiplicity * wings.length**2 / (4 * math.pi**3) * averaged @ weights
             np.testing.assert_allclose(profile.density[k, at], brute, rtol=5e-3)
 
 

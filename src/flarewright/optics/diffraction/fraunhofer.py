@@ -443,8 +443,8 @@ def spike_profile(
     end = 24.0 * wide + 12.0 * span
     step = max(narrow / 6.0, span / 48.0)
     v = np.asarray(np.arange(math.ceil(end / step) + 2) * step, dtype=np.float64)
-    # an FFT needs step * dq = 1 / a power of two, and repeats its sums with the period 1 / dq. A pixel that is wider than
-    # the fringes shows none of the light from other periods but its mean, which is known
+    # an FFT needs step * dq = 1 / a power of two, and repeats its sums with the period 1 / dq. The mean of what other
+    # periods add is known; fringes on it, which pixels wider than a fringe do not show, need a longer period
     period = 2 ** math.ceil(math.log2((4 if span > 4.0 * wide else 16) * len(v)))
     dq = 1.0 / (period * step)
     q = np.arange(math.ceil(1.0 / narrow / dq) + 1) * dq
