@@ -5,6 +5,7 @@ import gc
 import hashlib
 import os
 import shutil
+import signal
 import sys
 import tempfile
 from contextlib import contextmanager
@@ -31,6 +32,9 @@ gc.set_threshold(100_000)
 if "FLAREWRIGHT_STATE" not in os.environ:
     os.environ["FLAREWRIGHT_STATE"] = tempfile.mkdtemp(prefix="flarewright-tests-")
     atexit.register(shutil.rmtree, os.environ["FLAREWRIGHT_STATE"], ignore_errors=True)
+# a shell ignores Ctrl-C for what it starts in the background, and the tests press it
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 # the test process compiles missing kernels itself, without helpers; tests/contracts tests the helpers (docs/adr/0007)
 os.environ.setdefault("FLAREWRIGHT_HELPER", "1")
 
