@@ -76,7 +76,7 @@ def test_pixels_of_a_plate_are_those_of_an_anamorphic_lens(folder, lens, said):
         ("--white 0.9", "--white is the scale for --source"),
         ("--source sun", "the brightness of a source needs the scale of the plate: give --white"),
         ("--source moon --white 1", "--source 'moon' is no known lamp; write sun, headlight@METRES"),
-        ("--plate-transfer log", "--plate-transfer 'log' is unknown; choose srgb or linear"),
+        ("--plate-transfer log", "--plate-transfer 'log' is unknown; choose srgb, linear, rec709"),
         ("--plate-layer sky", "has no layers"),
         ("--flare-matte none.png", "the matte none.png does not exist"),
         ("--most-lights 0", "0 lights are not possible"),

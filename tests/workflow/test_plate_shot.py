@@ -16,8 +16,9 @@ from flarewright.io.images.exr import read_exr
 from flarewright.model import Holdout
 from flarewright.plates.settings import PlateSettings
 from flarewright.render.render import BLACK
+from flarewright.workflow.plates.plate_files import plate_frames
 from flarewright.workflow.plates.plate_frame import alike_lights
-from flarewright.workflow.plates.plate_sources import plate_frames, plate_shot, sources_file
+from flarewright.workflow.plates.plate_sources import plate_shot, sources_file
 from flarewright.workflow.shot_frame import _draw
 
 SIZE = (64, 36)

@@ -33,29 +33,31 @@ def _matrix(source: Colorspace, target: Colorspace) -> Floats:
     return xyz_to_rgb_matrix(target) @ np.linalg.inv(xyz_to_rgb_matrix(source))
 
 
-def expanded(values: Pixels, highlights: float) -> Pixels:
+def expanded(values: Pixels, highlights: float, white: float = 1.0) -> Pixels:
     """Expand display values, in which a shoulder has compressed bright lights.
 
     Parameters
     ----------
     values : ndarray
-        Linear, 0 to 1.
+        Linear, 0 to `white`.
     highlights : float
-        Value that 1 stands for.
+        Value that white stands for.
+    white : float
+        Value at which the plate clips.
 
     Returns
     -------
     ndarray
-        x / (1 - a x) with a = 1 - 1 / `highlights`: the inverse of the shoulder y = x / (1 + a x), which leaves dark
-        values as they are.
+        x / (1 - a x) with a = 1 / `white` - 1 / `highlights`: the inverse of the shoulder y = x / (1 + a x), which
+        leaves dark values as they are.
 
     Examples
     --------
     >>> expanded(np.array([0.01, 0.5, 1.0], np.float32), 50.0).round(3).tolist()
     [0.009999999776482582, 0.9800000190734863, 50.0]
     """
-    part = np.clip(values, 0.0, 1.0)
-    found: Pixels = (part / (1.0 - np.float64(1.0 - 1.0 / highlights) * part)).astype(np.float32)
+    part = np.clip(values, 0.0, white)
+    found: Pixels = (part / (1.0 - np.float64(1.0 / white - 1.0 / highlights) * part)).astype(np.float32)
     return found
 
 
@@ -69,4 +71,4 @@ def measured_pixels(plate: PlatePicture, highlights: float | None) -> Pixels:
         As of `expanded`, for plates that clip.
     """
     pixels = converted(plate, "rec709")
-    return pixels if highlights is None or plate.white is None else expanded(pixels, highlights)
+    return pixels if highlights is None or plate.white is None else expanded(pixels, highlights, plate.white)

@@ -7,7 +7,7 @@ from math import pi
 from typing import Literal
 
 from ..errors import ProjectError
-from ..io.images.plate_picture import Transfer
+from ..io.images.transfer import Transfer
 
 __all__ = ["PlateSettings", "SourceKind", "parse_source"]
 
@@ -35,11 +35,11 @@ class PlateSettings:
     Attributes
     ----------
     files : str
-        A picture, or a name with a place for the frame's number (`jobs.frame_list.FramePattern`).
+        A picture, a name with a place for the frame's number (`jobs.frame_list.FramePattern`), or a film.
     layer : str or None
         Layer of an EXR file.
-    transfer : {"srgb", "linear"} or None
-        How codes are read (`io.images.plate_picture.read_plate`).
+    transfer : str or None
+        How codes are read (`io.images.transfer`); None: by the kind of file, or as a film states.
     matte : str or None
         Grey pictures in the plate's frame: white may flare, black must not.
     threshold : float or None
@@ -66,6 +66,8 @@ class PlateSettings:
         Plate value of white paper in the sun, facing it.
     source : SourceKind or None
         Brightness of a lamp that is known; needs `white`.
+    first : int
+        Number of the first frame of a film. A shot sets that of the frame at 0 s.
     """
 
     files: str
@@ -83,6 +85,7 @@ class PlateSettings:
     highlights: float | None = None
     white: float | None = None
     source: SourceKind | None = None
+    first: int = 1
 
     def __post_init__(self) -> None:
         if self.threshold is not None and not 0.0 < self.threshold < float("inf"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -104,8 +104,9 @@ def shot(
         Called once with the first frame's project and the number of threads, before processes start: the command line
         compiles kernels here.
     plate : PlateSettings, optional
-        A picture, or one a frame, whose bright sources are lights, in addition to those of the project (of which dark
-        ones are left out). The layers then have the unit of the plate. `frames` of None: all frames of the plate.
+        A picture, one a frame, or a film (its first frame is that at 0 s), whose bright sources are lights, in
+        addition to those of the project (of which dark ones are left out). The layers then have the unit of the plate.
+        `frames` of None: all frames of the plate.
     over : path, optional
         Also write the plate with its flare, one EXR file a frame, named as `output`.
     searched : callable, optional
@@ -133,6 +134,8 @@ def shot(
     from .shot_frame import ShotPlan, frame_project
 
     _check(shutter_deg, subframes)
+    if plate is not None:
+        plate = replace(plate, first=project.timeline.start)
     pattern = FramePattern(os.fspath(output))
     numbers, remarks = shot_frames(project, frames, plate)
     pattern.check(numbers)
@@ -203,8 +206,9 @@ def _searched(
 ) -> PlateShot:
     """Find the sources of the plate in all frames of the shot, whichever of them this process draws."""
     from ..kernels.jit.warmup_processes import cores
+    from .plates.plate_files import plate_picture
     from .plates.plate_frame import check_comp, check_plate
-    from .plates.plate_sources import plate_picture, plate_shot, sources_file
+    from .plates.plate_sources import plate_shot, sources_file
 
     size_px = plate_picture(plate, frames[0]).size_px
     check_plate(project, size_px)
@@ -251,8 +255,9 @@ def shot_frames(
         There are none, or all of them lie outside the time in which the project moves.
     """
     if plate is not None:
-        from .plates.plate_sources import plate_frames
+        from .plates.plate_files import plate_frames
 
+        plate = replace(plate, first=project.timeline.start)
         return plate_frames(plate, parsed_frames(frames), project.timeline.start), []
     timeline, long_s = project.timeline, length_s(project)
     last = timeline.start + ceil(long_s * float(frame_rate(timeline.fps)) - 1e-6)

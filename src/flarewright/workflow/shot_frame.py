@@ -245,9 +245,11 @@ def _digest(plan: ShotPlan, frame: int, moments: tuple[Project, ...]) -> str:
             settings.layer,
             settings.transfer,
         ]
-        named = [settings.files, *([] if settings.matte is None else [settings.matte])]
+        from .plates.plate_files import plate_digest
+
+        matte = [] if settings.matte is None else [digest_of(FramePattern(settings.matte).path(frame))]
         # a flare alone carries attributes of its plate
-        made_of["plate"] = [digest_of(FramePattern(name).path(frame)) for name in named]
+        made_of["plate"] = [plate_digest(settings, frame), *matte]
     return sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()
 
 

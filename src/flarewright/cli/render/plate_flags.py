@@ -37,14 +37,15 @@ def plate_settings(plate: str | None, options: PlateOptions) -> PlateSettings | 
             flag = given[0].replace("_", "-")
             raise ProjectError(f"--{flag} is for a plate, and none is given; add its file, or omit --{flag}")
         return None
+    from ...io.images.transfer import TRANSFERS
     from ...plates.settings import PlateSettings, parse_source
 
     if options.threshold is not None and options.stops is not None:
         raise ProjectError("--threshold and --stops both say which pixels are lights; keep one")
     if options.white is not None and options.source is None:
         raise ProjectError("--white is the scale for --source, and no source is given; add it, or omit --white")
-    if options.plate_transfer not in (None, "srgb", "linear"):
-        raise ProjectError(f"--plate-transfer {options.plate_transfer!r} is unknown; choose srgb or linear")
+    if options.plate_transfer not in (None, *TRANSFERS):
+        raise ProjectError(f"--plate-transfer {options.plate_transfer!r} is unknown; choose {', '.join(TRANSFERS)}")
     values = {
         "layer": options.plate_layer, "transfer": options.plate_transfer, "matte": options.flare_matte,
         "threshold": options.threshold, "stops": options.stops, "fade": options.fade, "least_px": options.least_pixels,

@@ -139,10 +139,10 @@ def _sequences(options: ShotOptions) -> tuple[ShotOptions, dict[str, str]]:
 
 def _over_plate(options: ShotOptions, plate: PlateSettings) -> tuple[ShotOptions, list[str]]:
     """Return the options with what a plate states: its size and its rate; and remarks."""
-    from ...workflow.plates.plate_sources import plate_frames, plate_picture
+    from ...workflow.plates.plate_files import first_picture
     from ...workflow.shot import parsed_frames
 
-    first = plate_picture(plate, plate_frames(plate, parsed_frames(options.frames), options.start or 1)[0])
+    first = first_picture(plate, parsed_frames(options.frames), options.start or 1)
     width, height = first.size_px
     _check_frame(options, first.size_px)
     remarks = []

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 EPILOG = (
     "Examples:\n\nflarewright sources photo.exr --marked marked.png\n\n"
-    "flarewright sources plate.####.exr --frames 1001-1024 --threshold 8 --csv lights.csv"
+    "flarewright sources plate.####.exr --frames 1001-1024 --threshold 8 --csv lights.csv\n\n"
+    "flarewright sources drive.mp4 --marked marked.####.png"
 )
 
 # lines of the table on the terminal, and frames that are listed
@@ -32,7 +33,9 @@ _MOST_LINES = 20
 class SourcesInput:
     """The plate and its frames."""
 
-    plate: Annotated[str, typer.Argument(metavar="PLATE", help="A picture, or plate.####.exr (EXR, TIFF, PNG, JPEG).")]
+    plate: Annotated[
+        str, typer.Argument(metavar="PLATE", help="A picture, plate.####.exr (EXR, TIFF, PNG, JPEG), or a film.")
+    ]
     frames: Annotated[
         str | None, typer.Option(metavar="A-BxS", help="1001-1240, 1001-1240x2 or 1,5,9-12 (default: all files).")
     ] = None
@@ -58,7 +61,8 @@ def sources(options: SourcesOptions) -> None:
     Places and sizes are in pixels from the top left corner, brightness is the sum of plate values.
     """
     from ...plates.marked import light_rows
-    from ...workflow.plates.plate_sources import plate_frames, plate_shot
+    from ...workflow.plates.plate_files import plate_frames
+    from ...workflow.plates.plate_sources import plate_shot
     from ...workflow.shot import parsed_frames
 
     settings = plate_settings(options.plate, options)
@@ -144,7 +148,7 @@ def _write_marked(pattern: Any, found: PlateShot, settings: PlateSettings, frame
     from ...plates.marked import marked_plate
     from ...plates.measured_plate import converted
     from ...render.image.display import srgb_oetf
-    from ...workflow.plates.plate_sources import plate_picture
+    from ...workflow.plates.plate_files import plate_picture
 
     for frame in frames:
         linear = converted(plate_picture(settings, frame), "rec709")

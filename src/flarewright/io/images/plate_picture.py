@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import prod
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -17,12 +17,10 @@ from ...typing import Pixels
 from ..files.door import outside, refuse_claim, shown
 from .exr import CHROMATICITIES, read_exr_layer
 from .half import HALF_MAX
-from .picture import SCREEN, decode_srgb
+from .picture import SCREEN
+from .transfer import Transfer, decoded, white_of
 
-__all__ = ["PLATE_SUFFIXES", "PlatePicture", "Transfer", "read_plate"]
-
-Transfer = Literal["srgb", "linear"]
-"""What the codes of a file mean: display codes of sRGB, or linear values."""
+__all__ = ["PLATE_SUFFIXES", "PlatePicture", "read_plate"]
 
 _TIFF = (".tif", ".tiff")
 PLATE_SUFFIXES = (".exr", *_TIFF, *SCREEN)
@@ -42,8 +40,8 @@ class PlatePicture:
         Linear values, row 0 at the top.
     white : float or None
         Value at which the file clips; None for floating-point numbers, which do not clip.
-    transfer : {"srgb", "linear"}
-        How its codes were read.
+    transfer : str
+        How its codes were read (`transfer.decoded`).
     colorspace : {"rec709", "acescg"} or None
         Primaries that the file states; None if it states none, or others.
     pixel_aspect : float
@@ -87,8 +85,8 @@ def read_plate(
         also with 16 bits or floating-point numbers (extra `photo`).
     layer : str, optional
         Layer of an EXR file; None: its plain colours.
-    transfer : {"srgb", "linear"}, optional
-        None: srgb for whole numbers, linear for floating-point numbers.
+    transfer : str, optional
+        What codes mean (`transfer.decoded`). None: srgb for whole numbers, linear for floating-point numbers.
 
     Returns
     -------
@@ -123,12 +121,13 @@ def _exr(path: Path, layer: str | None, transfer: Transfer | None) -> PlatePictu
     pixels, damaged = _finite(pixels)
     kept = {name: header[name] for name in _KEPT if name in header}
     space, remarks = _primaries(header)
-    if transfer == "srgb":
-        pixels = decode_srgb(np.clip(pixels, 0.0, 1.0))
+    kind: Transfer = transfer or "linear"
+    if kind != "linear":
+        pixels = decoded(np.clip(pixels, 0.0, 1.0), kind)
     return PlatePicture(
         pixels,
-        1.0 if transfer == "srgb" else None,
-        transfer or "linear",
+        None if kind == "linear" else white_of(kind),
+        kind,
         space,
         float(header.get("pixelAspectRatio", 1.0)),
         _rate(header.get("framesPerSecond")),
@@ -212,7 +211,7 @@ def _tiff(path: Path, transfer: Transfer | None) -> PlatePicture:
         return _decoded((values / np.float32(np.iinfo(values.dtype).max)).astype(np.float32), transfer, ())
     with np.errstate(over="ignore"):
         pixels, damaged = _finite(values.astype(np.float32))
-    if transfer == "srgb":
+    if transfer not in (None, "linear"):
         return _decoded(np.clip(pixels, 0.0, 1.0), transfer, damaged)
     return PlatePicture(pixels, None, "linear", remarks=damaged)
 
@@ -222,4 +221,4 @@ def _decoded(coded: Pixels, transfer: Transfer | None, remarks: tuple[str, ...])
     kind: Transfer = transfer or "srgb"
     if transfer is None:
         remarks = (*remarks, "the plate has display codes, decoded from sRGB; --plate-transfer linear reads them as is")
-    return PlatePicture(decode_srgb(coded) if kind == "srgb" else coded, 1.0, kind, "rec709", remarks=remarks)
+    return PlatePicture(decoded(coded, kind), white_of(kind), kind, "rec709", remarks=remarks)

@@ -1,5 +1,6 @@
 """Shots over plates.
 
+- `plate_files`: `plate_picture` and `plate_frames`, the pictures of a sequence or a film
 - `plate_sources`: `plate_shot` finds and follows the lights of a plate; `PlateShot`
 - `plate_frame`: `with_plate_lights`, a frame's project over a plate; `write_comp`
 """

@@ -16,7 +16,8 @@ from ...plates.field_map import FieldMap, field_map
 from ...plates.lights import lights_at, plate_factor
 from ...plates.measured_plate import converted, measured_pixels
 from ...render.scene.resolve import resolve_project
-from .plate_sources import PlateShot, plate_matte, plate_picture
+from .plate_files import plate_matte, plate_picture
+from .plate_sources import PlateShot
 
 __all__ = [
     "alike_lights",

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 
@@ -21,8 +20,7 @@ from ...errors import FileError, FlarewrightError, ProjectError
 from ...io.files.atomic_write import write_atomically
 from ...io.files.door import outside_arrays
 from ...io.files.text_file import digest_of
-from ...io.images.plate_image import read_matte
-from ...io.images.plate_picture import PlatePicture, Transfer, read_plate
+from ...io.images.plate_picture import PlatePicture
 from ...jobs.frame_list import FramePattern, frames_text
 from ...jobs.processes import shares, work_off
 from ...plates.detection import LUMINANCE, Sources, find_sources, mean_luminance
@@ -31,9 +29,10 @@ from ...plates.lights import PlateTracks, plate_tracks
 from ...plates.measured_plate import measured_pixels
 from ...plates.settings import PlateSettings
 from ...plates.tracking import TrackingSettings, follow, steady
-from ...typing import Floats, Pixels
+from ...typing import Floats
+from .plate_files import is_still, plate_digest, plate_matte, plate_name, plate_picture
 
-__all__ = ["PlateShot", "plate_frames", "plate_picture", "plate_shot", "sources_file", "sources_of_frame"]
+__all__ = ["PlateShot", "plate_shot", "sources_file", "sources_of_frame"]
 
 # frames whose mean sets a threshold in stops
 _MEAN_FRAMES = 24
@@ -86,90 +85,6 @@ class _Search:
     size_px: tuple[int, int]
 
 
-def plate_frames(settings: PlateSettings, frames: Sequence[int] | None, start: int) -> tuple[int, ...]:
-    """Return the frames of a plate.
-
-    Parameters
-    ----------
-    settings : PlateSettings
-    frames : sequence of int, optional
-        Wanted ones; None: all files that there are.
-    start : int
-        Number of the frame of a single picture.
-
-    Returns
-    -------
-    tuple of int
-
-    Raises
-    ------
-    ProjectError
-        A frame is missing; the sentence names the first ones.
-    """
-    pattern = FramePattern(settings.files)
-    if pattern.numbered:
-        found = pattern.on_disk()
-        if not found:
-            raise ProjectError(
-                f"no file is named {settings.files}; check the folder, and the number of digits (#### or %04d)"
-            )
-        wanted = tuple(range(found[0], found[-1] + 1)) if frames is None else tuple(frames)
-    else:
-        wanted = (start,) if frames is None else tuple(frames)
-    _check_all_there(pattern, wanted, "the plate")
-    if settings.matte is not None:
-        _check_all_there(FramePattern(settings.matte), wanted, "the matte")
-    return wanted
-
-
-def _check_all_there(pattern: FramePattern, frames: Sequence[int], what: str) -> None:
-    """Raise ProjectError with the missing frames of a sequence."""
-    have = set(pattern.on_disk()) if pattern.numbered else None
-    if have is None and not Path(pattern.text).is_file():
-        raise ProjectError(f"{what} {pattern.text} does not exist; check the path and the spelling")
-    missing = [] if have is None else [frame for frame in frames if frame not in have]
-    if missing:
-        there = f"there are {frames_text(sorted(have))[:80]}" if have else "there is none"
-        raise ProjectError(
-            f"{what} {pattern.text} lacks frame{'s'[: len(missing) > 1]} {frames_text(missing)[:80]}; {there}: give "
-            "--frames that exist"
-        )
-
-
-def plate_picture(settings: PlateSettings, frame: int) -> PlatePicture:
-    """Read the plate of a frame; the last one is kept in memory.
-
-    Raises
-    ------
-    FileError
-        It cannot be read.
-    """
-    path = FramePattern(settings.files).path(frame)
-    changed_ns = path.stat().st_mtime_ns if path.is_file() else 0
-    return _picture(str(path), changed_ns, settings.layer, settings.transfer)
-
-
-@lru_cache(maxsize=1)
-def _picture(path: str, _: int, layer: str | None, transfer: Transfer | None) -> PlatePicture:
-    picture = read_plate(path, layer=layer, transfer=transfer)
-    picture.pixels.flags.writeable = False
-    return picture
-
-
-def plate_matte(settings: PlateSettings, frame: int, size_px: tuple[int, int]) -> Pixels | None:
-    """Read the matte of a frame; raises ProjectError if its size differs from the plate's."""
-    if settings.matte is None:
-        return None
-    path = FramePattern(settings.matte).path(frame)
-    matte = read_matte(path)
-    if matte.shape != size_px[::-1]:
-        raise ProjectError(
-            f"{path}: the matte is {matte.shape[1]}x{matte.shape[0]} and the plate {size_px[0]}x{size_px[1]}; give a "
-            "matte of the plate's size"
-        )
-    return matte
-
-
 def sources_of_frame(search: _Search, frame: int, threads: int | None = None) -> tuple[Floats, int]:
     """Find the sources of one frame.
 
@@ -195,7 +110,7 @@ def sources_of_frame(search: _Search, frame: int, threads: int | None = None) ->
     plate = plate_picture(search.settings, frame)
     if plate.size_px != search.size_px:
         raise ProjectError(
-            f"{FramePattern(search.settings.files).path(frame)} has {plate.size_px[0]}x{plate.size_px[1]} pixels, the "
+            f"{plate_name(search.settings, frame)} has {plate.size_px[0]}x{plate.size_px[1]} pixels, the "
             f"first frame {search.size_px[0]}x{search.size_px[1]}; give frames of one size"
         )
     found = find_sources(
@@ -252,9 +167,7 @@ def plate_shot(
         The plates cannot be read, differ in size, or have no source at all.
     """
     first = plate_picture(settings, frames[0])
-    still = not FramePattern(settings.files).numbered and (
-        settings.matte is None or not FramePattern(settings.matte).numbered
-    )
+    still = is_still(settings)
     threshold, remarks = _threshold(settings, frames[:1] if still else frames, first)
     search = _Search(settings, threshold, first.size_px)
     # one picture for all frames is searched once
@@ -295,7 +208,7 @@ def plate_shot(
         remarks.append("--highlights has no effect on a plate of floating-point numbers, which does not clip")
     clips_at = None
     if first.white is not None:
-        clips_at = _BELOW_WHITE * (settings.highlights or 1.0)
+        clips_at = _BELOW_WHITE * (settings.highlights or first.white)
     lights = plate_tracks(
         limited, first.size_px, point_px=settings.point_px, gain=settings.gain, known=settings.source,
         white=settings.white, clips_at=clips_at, joined=groups,
@@ -317,8 +230,8 @@ def _threshold(settings: PlateSettings, frames: Sequence[int], first: PlatePictu
         raise ProjectError("the plate is black, so a threshold in stops above its mean is none; give --threshold")
     found = mean * 2.0**settings.stops
     words = f"sources are brighter than {found:.3g}, {settings.stops:g} stops above the plate's mean of {mean:.3g}"
-    if first.white is not None and found > _BELOW_WHITE * (settings.highlights or 1.0):
-        found = _BELOW_WHITE * (settings.highlights or 1.0)
+    if first.white is not None and found > _BELOW_WHITE * (settings.highlights or first.white):
+        found = _BELOW_WHITE * (settings.highlights or first.white)
         words = (
             f"sources are brighter than {found:.3g}, near the plate's white: {settings.stops:g} stops above its "
             f"mean of {mean:.3g} would lie beyond it"
@@ -361,24 +274,13 @@ def _searched(
 
 def _made_of(search: _Search, frame: int) -> str:
     """Return a digest of what determines the sources of a frame."""
-    settings = asdict(search.settings)
-    for later in (
-        "stops",
-        "knee_stops",
-        "fade",
-        "most_lights",
-        "point_px",
-        "gain",
-        "white",
-        "source",
-        "threshold",
-        "files",
-    ):
-        del settings[later]
-    plate = digest_of(FramePattern(search.settings.files).path(frame))
-    matte = None if search.settings.matte is None else digest_of(FramePattern(search.settings.matte).path(frame))
-    del settings["matte"]
-    parts = (__version__, repr(sorted(settings.items())), repr(search.threshold), repr(search.size_px), plate, matte)
+    settings = search.settings
+    # what the values of a pixel depend on; the rest is applied to the sources
+    how = {"highlights": settings.highlights, "layer": settings.layer, "least_px": settings.least_px}
+    how["transfer"] = settings.transfer
+    plate = plate_digest(settings, frame)
+    matte = None if settings.matte is None else digest_of(FramePattern(settings.matte).path(frame))
+    parts = (__version__, repr(sorted(how.items())), repr(search.threshold), repr(search.size_px), plate, matte)
     return sha256(repr(parts).encode()).hexdigest()
 
 

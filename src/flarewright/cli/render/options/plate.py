@@ -17,7 +17,8 @@ class PlateFile:
     plate: Annotated[
         str | None,
         typer.Argument(
-            metavar="PLATE", help="A picture or plate.####.exr, whose bright areas are lights (EXR, TIFF, PNG, JPEG)."
+            metavar="PLATE",
+            help="A picture, plate.####.exr (EXR, TIFF, PNG, JPEG) or a film, whose bright areas are lights.",
         ),
     ] = None
 
@@ -32,7 +33,7 @@ class PlateOptions:
     plate_transfer: Annotated[
         str | None,
         typer.Option(
-            metavar="srgb|linear", help="Codes of the plate (default: srgb, floating point linear).",
+            metavar="NAME", help="Codes: srgb, linear, rec709, gamma22, gamma28, pq or hlg (default: as the file is).",
             rich_help_panel=PANEL,
         ),
     ] = None  # fmt: skip

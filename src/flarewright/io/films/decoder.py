@@ -1,0 +1,114 @@
+"""Open a film for reading, safe from what other files it names and from how large its header says that it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, BinaryIO
+
+from ...errors import FileError, optional
+from ..files.door import outside, read_limit_bytes, refuse_claim, shown
+
+__all__ = ["READS", "av_module", "opened", "video_of"]
+
+READS = "give MP4, MOV, MKV, WebM, AVI or MXF, or an image sequence"
+"""End of the message about a film that cannot be read."""
+
+# lists of other files, such as HLS, are no films: they open files and addresses that the user did not name
+_CONTAINERS = "mov,mp4,matroska,webm,avi,mxf,mpeg,mpegts,asf,ogg"
+# the decoder's pictures, the codes, and linear values on the way
+_PIXEL_BYTES = 50
+_LARGEST_SIDE = 16384
+_BUFFER_BYTES = 1 << 18
+
+
+def av_module(path: Any) -> Any:
+    """Return PyAV; raises FileError with the remedy where it is missing."""
+    av = optional("av", "video", f"the film {shown(path)}", kind=FileError, hint=", or give an image sequence")
+    # our sentence is the only one about a damaged film
+    av.logging.set_level(None)
+    return av
+
+
+@contextmanager
+def opened(path: str) -> Iterator[Any]:
+    """Open a film; its errors become one sentence.
+
+    Parameters
+    ----------
+    path : str
+
+    Yields
+    ------
+    av.container.InputContainer
+
+    Raises
+    ------
+    FileError
+        PyAV or the file is missing, or the file is damaged, no film, or too large; also while the block reads it.
+    """
+    av = av_module(path)
+    options = {"format_whitelist": _CONTAINERS, "protocol_whitelist": "none", "max_pixels": str(_most_pixels())}
+    with (
+        outside(path, "a film", remedy=READS) as file,
+        _plain(av),
+        _not_empty(file, path),
+        av.open(file, "r", options=options, metadata_errors="replace", buffer_size=_BUFFER_BYTES) as container,
+    ):
+        yield container
+
+
+@contextmanager
+def _plain(av: Any) -> Iterator[None]:
+    """Turn errors of FFmpeg, which count as errors of the operating system, into those of the file's contents."""
+    failure = (av.error.FFmpegError, OSError)
+    try:
+        yield
+    except failure as error:
+        raise ValueError((error.strerror or "unknown error").lower()) from None
+
+
+@contextmanager
+def _not_empty(file: BinaryIO, path: str) -> Iterator[None]:
+    if not file.read(1):
+        raise FileError(f"{shown(path)} is empty: a film was expected")
+    file.seek(0)
+    yield
+
+
+def _most_pixels() -> int:
+    """Return the largest number of pixels of a frame that the limit on memory allows."""
+    return max(1, int(read_limit_bytes() / _PIXEL_BYTES))
+
+
+def video_of(container: Any, path: str) -> Any:
+    """Return the first stream of pictures of a film, with one thread of its own.
+
+    Raises
+    ------
+    FileError
+        There is none, its codec is unknown, or its frames need too much memory.
+    """
+    found = [stream for stream in container.streams.video if not _is_cover(stream)]
+    if not found:
+        raise FileError(f"{shown(path)} has no pictures: {READS}")
+    stream = found[0]
+    codec = stream.codec_context
+    if codec is None:
+        raise FileError(f"{shown(path)} has pictures of an unknown codec: {READS}")
+    width, height = codec.width, codec.height
+    if width < 1 or height < 1:
+        raise FileError(f"{shown(path)} states no size of its pictures: {READS}")
+    refuse_claim(path, f"{width} x {height} pixels", width * height * _PIXEL_BYTES)
+    if max(width, height) > _LARGEST_SIDE:
+        raise FileError(f"{shown(path)} states {width} x {height} pixels: give at most {_LARGEST_SIDE} a side")
+    # the bytes of a frame do not depend on threads; processes share the frames
+    codec.thread_count = 1
+    # a later frame can be larger than the first
+    codec.options = {"max_pixels": str(_most_pixels())}
+    return stream
+
+
+def _is_cover(stream: Any) -> bool:
+    """Return whether a stream is the picture on the cover of a piece of music."""
+    return "attached_pic" in str(getattr(stream, "disposition", "")).lower()
