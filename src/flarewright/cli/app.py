@@ -46,6 +46,7 @@ from .project import init as project_init
 from .project import scene_check, scene_init, scene_schema
 from .project import schema as project_schema
 from .render import command as render
+from .render import film_command as film
 from .render import ghosts_command as ghosts
 from .render import nuke_command as nuke
 from .render import shot_command as shot
@@ -78,6 +79,7 @@ measure_app = typer.Typer(help="Measure a real camera's flare and replay it.")
 
 app.command("render", epilog=render.EPILOG)(render.render)
 app.command("shot", epilog=shot.EPILOG)(shot.shot)
+app.command("film", epilog=film.EPILOG)(film.film)
 app.command("nuke-script", epilog=nuke.EPILOG)(nuke.nuke_script)
 app.command("dataset", epilog=dataset.EPILOG)(dataset.dataset)
 app.command("sources", epilog=sources.EPILOG)(sources.sources)

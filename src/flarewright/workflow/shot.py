@@ -18,6 +18,8 @@ from .keyframes import frame_rate, is_still, length_s, time_of
 
 if TYPE_CHECKING:
     from ..plates.settings import PlateSettings
+    from ..render.image.display import Transform
+    from .film import FilmResult
     from .plates.plate_sources import PlateShot
     from .shot_frame import FrameResult, ShotPlan
 
@@ -45,12 +47,14 @@ class ShotResult:
     processes : int
     plate : PlateShot or None
         The sources of the plate, if there is one.
+    movie : FilmResult or None
     """
 
     frames: tuple[FrameResult, ...]
     remarks: tuple[str, ...]
     processes: int
     plate: PlateShot | None = None
+    movie: FilmResult | None = None
 
 
 def shot(
@@ -70,6 +74,10 @@ def shot(
     plate: PlateSettings | None = None,
     over: str | os.PathLike[str] | None = None,
     searched: Callable[[int, int, int], None] | None = None,
+    movie: str | os.PathLike[str] | None = None,
+    movie_view: Transform | None = None,
+    movie_exposure: float | None = None,
+    encoded: Callable[[int, int, int], None] | None = None,
 ) -> ShotResult:
     """Draw frames of a project whose values change over time, and write a file for each.
 
@@ -111,6 +119,12 @@ def shot(
         Also write the plate with its flare, one EXR file a frame, named as `output`.
     searched : callable, optional
         Called after the search for sources in each plate with the frame, the number of searched frames and that of all.
+    movie : path, optional
+        Also make a film, ".mp4" or ".mov", of the comps, or else of the flare; from the finished files.
+    movie_view, movie_exposure
+        `transform` and `exposure_stops` of `film.assemble_film`.
+    encoded : callable, optional
+        Called after each frame of the film, as `searched`.
 
     Returns
     -------
@@ -141,7 +155,10 @@ def shot(
     pattern.check(numbers)
     _check_output(pattern)
     comp = _comp_pattern(over, plate, numbers)
-    _keep_sequences(project, plate, pattern, comp, numbers)
+    if movie is not None:
+        _check_movie(movie, pattern, chunk)
+    written = [pattern.text, comp, "" if movie is None else os.fspath(movie)]
+    _keep_sequences(project, plate, [FramePattern(name) for name in written if name], numbers)
     mine = numbers if chunk is None else chunk_of(numbers, *parse_chunk(chunk))
     if shutter_deg == 0.0 and subframes is not None and subframes > 1:
         remarks.append("sub-frames have no effect without an open shutter: give its angle, such as 180 degrees")
@@ -165,7 +182,16 @@ def shot(
         if report is not None:
             report(one.result, len(done), len(mine))
     done.sort(key=lambda result: result.frame)
-    return ShotResult(tuple(done), (*remarks, *_remarks(done)), number, found)
+    film = None
+    if movie is not None:
+        from .film import assemble_film
+
+        film = assemble_film(
+            comp or pattern.text, movie, frames=numbers, fps=project.timeline.fps, transform=movie_view,
+            exposure_stops=movie_exposure, report=encoded,
+        )  # fmt: skip
+        remarks += film.remarks
+    return ShotResult(tuple(done), (*remarks, *_remarks(done)), number, found, film)
 
 
 def _comp_pattern(over: str | os.PathLike[str] | None, plate: PlateSettings | None, frames: Sequence[int]) -> str:
@@ -180,13 +206,30 @@ def _comp_pattern(over: str | os.PathLike[str] | None, plate: PlateSettings | No
     return pattern.text
 
 
+def _check_movie(movie: str | os.PathLike[str], output: FramePattern, chunk: str | None) -> None:
+    """Raise an error before the work if the film cannot be made of the frames."""
+    from ..io.films.film_writer import check_film_name
+
+    check_film_name(movie)
+    if chunk is not None:
+        raise ProjectError(
+            f"a film needs all frames, and chunk {chunk} draws some; draw all chunks without a film, then: flarewright "
+            f"film {output.text} -o {os.fspath(movie)}"
+        )
+    if FramePattern(os.fspath(movie)).numbered:
+        raise ProjectError(f"the film {os.fspath(movie)} is one file; name it without a number (####, %04d, $F4)")
+    if not output.numbered:
+        path = Path(output.text)
+        raise ProjectError(f"a film is made of numbered frames; write {path.stem}.####{path.suffix} for {path}")
+
+
 def _keep_sequences(
-    project: Project, plate: PlateSettings | None, output: FramePattern, comp: str, frames: Sequence[int]
+    project: Project, plate: PlateSettings | None, outputs: Sequence[FramePattern], frames: Sequence[int]
 ) -> None:
     """Raise an error if a frame would replace one that is read, or another one that is written."""
     read = {*holdout_files(project), *(() if plate is None else (plate.files, plate.matte))} - {None}
     known = {FramePattern(name).path(frame).resolve() for name in read for frame in frames}
-    for pattern in (output, *([FramePattern(comp)] if comp else [])):
+    for pattern in outputs:
         written = {pattern.path(frame).resolve() for frame in frames}
         if written & known:
             taken = min(written & known)

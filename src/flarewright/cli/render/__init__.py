@@ -13,6 +13,7 @@
 - `nuke_command`: `flarewright nuke-script`
 - `shot_command`: `shot`, the frames of a moving project
 - `plate_flags`: `plate_settings` converts the options of a plate
+- `film_command`: `film`, a film of finished frames
 - `sources_command`: `sources`, the lights found in a plate
 - `ghosts_command`: `ghosts`, the ghost analysis of a lens
 - `ghost_sweep`: its `--sweep` over fields, wavelengths and f-numbers

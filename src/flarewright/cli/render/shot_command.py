@@ -15,6 +15,7 @@ from ..common import first_run_bar, print_json, print_remarks, progress_bar
 from ..option_record import with_options
 from ..progress_lines import ProgressLines, print_line
 from .command import keep_inputs, project_of_options
+from .film_command import film_data, film_line, film_words
 from .options.record import RenderOptions
 from .options.shot import ShotOptions
 
@@ -28,7 +29,8 @@ EPILOG = (
     "Examples:\n\nflarewright shot --project drive.toml -o flare.####.exr\n\n"
     "flarewright shot --project drive.toml --frames 1001-1240 --start 1001 --fps 25 --shutter 180 -o flare.%04d.exr\n\n"
     "flarewright shot --project drive.toml --chunk 2/5 -o flare.####.exr\n\n"
-    "flarewright shot plate.####.exr --lens canon-28-80 --fstop 4 -o flare.####.exr --over comp.####.exr"
+    "flarewright shot plate.####.exr --lens canon-28-80 --fstop 4 -o flare.####.exr --over comp.####.exr\n\n"
+    "flarewright shot drive.mp4 --lens canon-28-80 -o flare.####.exr --over comp.####.exr --movie comp.mp4"
 )
 
 
@@ -43,11 +45,12 @@ def shot(options: ShotOptions) -> None:
     from .plate_flags import plate_settings
 
     parts = _parts(options.parts)
+    _check_movie(options)
     plate = plate_settings(options.plate, options)
     project, remarks = _project(options, plate)
     _keep_inputs(options, project, plate)
     started = time.monotonic()
-    with _progress() as (report, searched):
+    with _progress() as (report, searched, encoded):
         result = draw(
             project,
             options.output,
@@ -64,6 +67,10 @@ def shot(options: ShotOptions) -> None:
             plate=plate,
             over=options.over,
             searched=searched,
+            movie=options.movie,
+            movie_view=options.view,  # type: ignore[arg-type]
+            movie_exposure=options.exposure,
+            encoded=encoded,
         )
     remarks = [*remarks, *result.remarks]
     print_remarks(remarks)
@@ -83,6 +90,7 @@ def shot(options: ShotOptions) -> None:
                 "fps": project.timeline.fps,
                 "start": project.timeline.start,
                 **({} if result.plate is None else {"plate": _plate_data(result.plate)}),
+                **({} if result.movie is None else {"movie": film_data(result.movie)}),
                 "remarks": remarks,
             }
         )
@@ -91,6 +99,18 @@ def shot(options: ShotOptions) -> None:
         words = [f"wrote {drawn} frames in {seconds:.1f} s"] if drawn else []
         words += [f"kept {kept} frames that the same settings made"] if kept else []
         print_remarks([", ".join(words) or "no frame was to be drawn"])
+        if result.movie is not None:
+            print_remarks([film_words(result.movie)])
+
+
+def _check_movie(options: ShotOptions) -> None:
+    """Check the flags of the film."""
+    from .preview import preview_look
+
+    for flag, value in (("--view", options.view), ("--exposure", options.exposure)):
+        if value is not None and options.movie is None:
+            raise ProjectError(f"{flag} is for the film, and none is made; add --movie FILM.mp4, or omit {flag}")
+    preview_look(view=options.view, exposure=options.exposure, ev=None, shutter=None, iso=None, lux=None, no_png=False)
 
 
 def _parts(text: str | None) -> Literal["multi", "single"]:
@@ -111,8 +131,8 @@ def _project(options: ShotOptions, plate: PlateSettings | None) -> tuple[Project
         options, found = _over_plate(options, plate)
     options, sequences = _sequences(options)
     names = {each.name for each in fields(RenderOptions)} & {each.name for each in fields(ShotOptions)}
-    # a render's shutter exposes its PNG
-    same = {name: getattr(options, name) for name in names - {"output", "shutter"}}
+    # a render's shutter exposes its PNG, whose view is not that of a film
+    same = {name: getattr(options, name) for name in names - {"output", "shutter", "view", "exposure"}}
     timeline = {key: value for key, value in (("fps", options.fps), ("start", options.start)) if value is not None}
     _, project, remarks = project_of_options(RenderOptions(**same, output=Path(options.output)), None, timeline)
     if sequences:
@@ -202,7 +222,7 @@ def _keep_inputs(options: ShotOptions, project: Project, plate: PlateSettings | 
 
     frames = shot_frames(project, parsed_frames(options.frames), plate)[0]
     outputs = [FramePattern(name).path(frame) for name in (options.output, options.over) if name for frame in frames]
-    keep_inputs(project, options.project, outputs)
+    keep_inputs(project, options.project, [*outputs, *([] if options.movie is None else [options.movie])])
 
 
 def _plate_data(plate: PlateShot) -> dict[str, Any]:
@@ -230,7 +250,7 @@ _Searched = Callable[[int, int, int], None]
 
 
 @contextmanager
-def _progress() -> Iterator[tuple[_Report, _Searched]]:
+def _progress() -> Iterator[tuple[_Report, _Searched, _Searched]]:
     """Show a bar on a terminal; elsewhere print one JSON object per frame to stderr."""
     if sys.stderr.isatty():
         with progress_bar() as begin:
@@ -244,6 +264,7 @@ def _progress() -> Iterator[tuple[_Report, _Searched]]:
             yield (
                 lambda result, done, of: show("shot", done, of, f"frame {result.frame}, {done} of {of}"),
                 lambda frame, done, of: show("finding lights", done, of, f"frame {frame}, {done} of {of}"),
+                lambda frame, done, of: show("film", done, of, f"frame {frame}, {done} of {of}"),
             )
         return
     lines = ProgressLines()
@@ -259,4 +280,5 @@ def _progress() -> Iterator[tuple[_Report, _Searched]]:
             {"frame": result.frame, "file": result.file}, drawn=result.drawn, done=done, of=of
         ),
         search_line,
+        film_line,
     )

@@ -100,10 +100,11 @@ def _codes(frame: Any, film: Film) -> np.ndarray:
     flags, ranges = av.video.reformatter.Interpolation, av.video.reformatter.ColorRange
     # the same range on both sides: nothing is scaled
     same = ranges.JPEG if film.coding.full_range else ranges.MPEG
+    # a sharper filter would ring around lights
     exact = flags.ACCURATE_RND | flags.FULL_CHR_H_INT | flags.FULL_CHR_H_INP | flags.BITEXACT
     how = {
         "src_color_range": same, "dst_color_range": same, "src_colorspace": 1, "dst_colorspace": 1, "threads": 1,
-        "interpolation": flags.BICUBIC | exact,
+        "interpolation": flags.BILINEAR | exact,
     }  # fmt: skip
     if film.coding.matrix is None:
         green, blue, red = _planes(frame.reformat(format="gbrp16le", **how))

@@ -19,6 +19,7 @@ from .quality import QualityOptions
 from .starburst import StarburstOptions
 
 FRAMES = "Frames"
+MOVIE = "Film"
 WORK = "Processes"
 
 
@@ -75,7 +76,34 @@ class ShotFiles:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ShotOutput(LayerOptions, ShotFiles):
+class MovieOptions:
+    """The film. None: not given."""
+
+    movie: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILM.mp4|FILM.mov", help="Also make a film of the comp, or of the flare: H.264 or ProRes.",
+            rich_help_panel=MOVIE,
+        ),
+    ] = None  # fmt: skip
+    view: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Of the film: filmic (default for a flare), srgb (for a comp) or aces.",
+            rich_help_panel=MOVIE,
+        ),
+    ] = None  # fmt: skip
+    exposure: Annotated[
+        float | None,
+        typer.Option(
+            metavar="STOPS", help="Of the film (default: automatic and the same for all frames; 0 for a comp).",
+            rich_help_panel=MOVIE,
+        ),
+    ] = None  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShotOutput(MovieOptions, LayerOptions, ShotFiles):
     """What is written, and by how many processes. None or empty: not given."""
 
     parts: Annotated[
