@@ -1,6 +1,7 @@
 """Readers and writers of files; every error message names the file, the place in it, and a remedy.
 
 - `files`: text, TOML and atomic writing; error sentences for all readers
+- `films`: frames of films, and films of frames
 - `images`: EXR, PNG, photographs, masks, mattes
 - `lens`: lens files and importers, the glass catalogue, short texts of coatings and plates
 - `project`: project, scene and look files, short texts of spectra

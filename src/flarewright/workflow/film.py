@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,10 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._version import __version__
-from ..errors import FlarewrightError, ProjectError
+from ..errors import FlarewrightError, OutputError, ProjectError
+from ..io.files.text_file import digest_of
 from ..io.films.film_kind import is_film
 from ..io.films.film_time_code import code_text
-from ..io.films.film_writer import FilmCodec, check_film_name, padded_size, write_film
+from ..io.films.film_writer import (
+    FILM_CODECS,
+    FilmCodec,
+    check_film_name,
+    comment_of,
+    join_films,
+    padded_size,
+    write_film,
+)
 from ..io.images.exr import read_exr
 from ..io.images.plate_picture import PlatePicture, read_plate
 from ..jobs.frame_list import FramePattern, frames_text, parse_frames
@@ -26,11 +38,14 @@ from .keyframes import frame_rate
 if TYPE_CHECKING:
     from ..render.image.display import Transform
 
-__all__ = ["FilmResult", "assemble_film"]
+__all__ = ["FilmResult", "assemble_film", "check_film"]
 
 # frames whose flare sets an automatic exposure
 _EXPOSED_FRAMES = 24
 _FPS = 24.0
+# frames that are encoded again after an interruption, at most
+_PART_FRAMES = 120
+_OURS = "Flarewright "
 
 
 @dataclass(frozen=True)
@@ -71,6 +86,8 @@ def assemble_film(
     report: Callable[[int, int, int], None] | None = None,
 ) -> FilmResult:
     """Make a film of finished frames.
+
+    It is encoded in parts in the folder FILM.parts, which a repeated call keeps after an interruption.
 
     Parameters
     ----------
@@ -119,21 +136,84 @@ def assemble_film(
     stated = view_text(stops, kind, first.colorspace or "rec709", automatic=automatic)
     remarks += _padding(first.size_px, codec)
 
-    def pictures() -> Iterator[tuple[int, NDArray[np.uint8]]]:
-        for done, frame in enumerate(numbers, 1):
-            picture = read_plate(pattern.path(frame), layer=layer)
-            yield frame - numbers[0], view(picture.pixels, stops, kind, picture.colorspace or "rec709")
-            if report is not None:
-                report(frame, done, len(numbers))
-
     code = (first.header or {}).get("timeCode")
-    write_film(
-        output, pictures(), first.size_px, rate, time_code="" if code is None else code_text(code),
-        pixel_aspect=first.pixel_aspect, metadata={"comment": f"Flarewright {__version__}; {stated}"},
-    )  # fmt: skip
+    film = _Film(Path(output), pattern, numbers, rate, layer, kind, stops, first.size_px, first.pixel_aspect)
+    _encode(film, "" if code is None else code_text(code), f"{_OURS}{__version__}; {stated}", report)
     return FilmResult(
         os.fspath(output), numbers, rate, padded_size(first.size_px, codec), codec.words, stated, stops, tuple(remarks)
     )
+
+
+def check_film(output: str | os.PathLike[str]) -> None:
+    """Raise an error before the work if a film cannot be written, or would replace one of another program."""
+    check_film_name(output)
+    place = Path(output)
+    if FramePattern(os.fspath(output)).numbered:
+        raise ProjectError(f"the film {place} is one file; name it without a number (####, %04d, $F4)")
+    if place.exists() and not comment_of(place).startswith(_OURS):
+        raise OutputError(f"{place} exists, and is no film of Flarewright; move it, or choose another name")
+
+
+@dataclass(frozen=True)
+class _Film:
+    """What all parts of a film share."""
+
+    output: Path
+    pattern: FramePattern
+    frames: tuple[int, ...]
+    fps: Fraction
+    layer: str | None
+    transform: Transform
+    stops: float
+    size_px: tuple[int, int]
+    pixel_aspect: float
+
+
+def _encode(film: _Film, code: str, comment: str, report: Callable[[int, int, int], None] | None) -> None:
+    """Encode the parts of a film, of which an interrupted call has kept some, and join them."""
+    folder = film.output.with_name(f"{film.output.name}.parts")
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise OutputError(f"cannot write {folder}: {reason}; check the free space and the permissions") from None
+    parts = []
+    for at in range(0, len(film.frames), _PART_FRAMES):
+        some = film.frames[at : at + _PART_FRAMES]
+        part = folder / f"{at // _PART_FRAMES:05d}{film.output.suffix}"
+        digest = _digest(film, some)
+        kept = part.exists() and comment_of(part) == digest
+        if not kept:
+
+            def pictures(some: Sequence[int] = some, at: int = at) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+                for k, frame in enumerate(some):
+                    picture = read_plate(film.pattern.path(frame), layer=film.layer)
+                    yield (
+                        frame - some[0],
+                        view(picture.pixels, film.stops, film.transform, picture.colorspace or "rec709"),
+                    )
+                    if report is not None:
+                        report(frame, at + k + 1, len(film.frames))
+
+            write_film(part, pictures(), film.size_px, film.fps, pixel_aspect=film.pixel_aspect, comment=digest)
+        elif report is not None:
+            report(some[-1], at + len(some), len(film.frames))
+        parts.append((some[0] - film.frames[0], part))
+    join_films(film.output, parts, film.fps, time_code=code, comment=comment)
+    # also what a killed call has left; files of other programs stay, and the folder with them
+    for left in folder.iterdir():
+        if re.fullmatch(r"\d{5}|\.\d{5}\.[0-9a-f]{8}\.part", left.stem) and left.suffix in FILM_CODECS:
+            left.unlink(missing_ok=True)
+    with suppress(OSError):
+        folder.rmdir()
+
+
+def _digest(film: _Film, frames: Sequence[int]) -> str:
+    """Return a digest of all that determines a part of a film."""
+    files = [digest_of(film.pattern.path(frame)) for frame in frames]
+    moments = [frame - frames[0] for frame in frames]
+    about = (__version__, film.fps, film.layer, film.transform, film.stops, film.size_px, film.pixel_aspect)
+    return sha256(repr((about, moments, files)).encode()).hexdigest()
 
 
 def _frames(pattern: FramePattern, frames: str | Sequence[int] | None) -> tuple[int, ...]:

@@ -54,6 +54,7 @@ JOBS = (
     LongJob(("predict",), "NAME.partial.npz"),
     LongJob(("render",), "NAME.partial, NAME.state.npz", "the same command, or --resume NAME.state.npz"),
     LongJob(("shot",), "the finished frames"),
+    LongJob(("film",), "FILM.parts"),
     LongJob(("dataset",), "the finished items", needs=("-o", "--output")),
     LongJob(("sources",), "NAME.lights.npz", needs=("--csv", "--marked")),
     LongJob(("gallery",), "DIR/gallery.json"),

@@ -208,16 +208,14 @@ def _comp_pattern(over: str | os.PathLike[str] | None, plate: PlateSettings | No
 
 def _check_movie(movie: str | os.PathLike[str], output: FramePattern, chunk: str | None) -> None:
     """Raise an error before the work if the film cannot be made of the frames."""
-    from ..io.films.film_writer import check_film_name
+    from .film import check_film
 
-    check_film_name(movie)
+    check_film(movie)
     if chunk is not None:
         raise ProjectError(
             f"a film needs all frames, and chunk {chunk} draws some; draw all chunks without a film, then: flarewright "
             f"film {output.text} -o {os.fspath(movie)}"
         )
-    if FramePattern(os.fspath(movie)).numbered:
-        raise ProjectError(f"the film {os.fspath(movie)} is one file; name it without a number (####, %04d, $F4)")
     if not output.numbered:
         path = Path(output.text)
         raise ProjectError(f"a film is made of numbered frames; write {path.stem}.####{path.suffix} for {path}")

@@ -60,10 +60,10 @@ def read_film_frame(path: str | os.PathLike[str], index: int, *, transfer: Trans
     with _ONE_AT_A_TIME:
         try:
             frame = _decoder(film.path, film.digest).send(index)
-        except FlarewrightError:
+        except FlarewrightError as error:
             # it has ended
             _decoder.cache_clear()
-            raise
+            raise FileError(f"frame {index + 1} of {error}") from error
     if (frame.height, frame.width) != (film.size_px if film.rotation_deg % 180 else film.size_px[::-1]):
         raise FileError(f"{shown(path)} changes its size to {frame.width}x{frame.height}: give a film of one size")
     kind: Transfer = transfer or film.coding.transfer
@@ -158,7 +158,7 @@ def _decoding(film: Film) -> Generator[Any, int, None]:
                 else:
                     at, frame = _reached(following, wanted)
                     if frame is None and from_start:
-                        raise FileError(f"{shown(film.path)}: its frame {wanted + 1} cannot be decoded: is it damaged?")
+                        raise FileError(f"{shown(film.path)} cannot be decoded: is it damaged?")
                 if frame is None:
                     # some containers find no key frames: begin again, and decode all frames in between
                     seeks = False

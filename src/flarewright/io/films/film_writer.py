@@ -1,9 +1,10 @@
-"""Write a film of pictures for a screen: H.264 or ProRes."""
+"""Write a film of pictures for a screen, H.264 or ProRes; long ones in parts, which are joined without a change."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -12,10 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import OutputError, optional
+from ...errors import FileError, OutputError, optional
 from ..files.atomic_write import write_atomically
+from .decoder import opened
 
-__all__ = ["FILM_CODECS", "FilmCodec", "check_film_name", "padded_size", "write_film"]
+__all__ = ["FILM_CODECS", "FilmCodec", "check_film_name", "comment_of", "join_films", "padded_size", "write_film"]
 
 # quality of H.264: a difference of about one code of 255; more bits for dark gradients, which a flare consists of
 _QUALITY = (("crf", "14"), ("aq-mode", "3"), ("preset", "medium"))
@@ -107,9 +109,8 @@ def write_film(
     size_px: tuple[int, int],
     fps: Fraction,
     *,
-    time_code: str = "",
     pixel_aspect: float = 1.0,
-    metadata: dict[str, str] | None = None,
+    comment: str = "",
 ) -> None:
     """Write a film; the file is complete or absent.
 
@@ -122,11 +123,9 @@ def write_film(
     size_px : tuple of int
         Of the pictures. Odd ones are extended by their last column and row.
     fps : Fraction
-    time_code : str
-        Of the first frame: "10:00:00:00".
     pixel_aspect : float
-    metadata : dict, optional
-        "title", "comment".
+    comment : str
+        Stored in the file.
 
     Raises
     ------
@@ -142,26 +141,87 @@ def write_film(
     av = _module(Path(path))
 
     def write(temporary: Path) -> None:
-        options = {"movflags": "+faststart"}
-        try:
-            with av.open(str(temporary), "w", options=options) as container:
-                # no names of versions, so that the bytes depend on the pictures only
-                container.flags |= av.container.Flags.bitexact.value
-                container.metadata.update(metadata or {})
-                stream = _stream(container, codec, padded_size(size_px, codec), fps, pixel_aspect)
-                if time_code:
-                    stream.metadata["timecode"] = time_code
-                for moment, picture in pictures:
-                    _check_size(path, picture, size_px)
-                    frame = _frame(av, _padded(picture, codec), codec)
-                    frame.pts, frame.time_base = moment, 1 / fps
-                    container.mux(stream.encode(frame))
-                container.mux(stream.encode())
-        except av.error.FFmpegError as error:
-            # a full disk comes as an error of FFmpeg
-            raise OSError(error.errno, error.strerror or "unknown error") from None
+        with _errors_of_the_disk(av), av.open(str(temporary), "w") as container:
+            # no names of versions, so that the bytes depend on the pictures only
+            container.flags |= av.container.Flags.bitexact.value
+            container.metadata["comment"] = comment
+            stream = _stream(container, codec, padded_size(size_px, codec), fps, pixel_aspect)
+            for moment, picture in pictures:
+                _check_size(path, picture, size_px)
+                frame = _frame(av, _padded(picture, codec), codec)
+                frame.pts, frame.time_base = moment, 1 / fps
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode())
 
     write_atomically(Path(path), write)
+
+
+def join_films(
+    path: str | os.PathLike[str], parts: Sequence[tuple[int, Path]], fps: Fraction, *, time_code: str = "",
+    comment: str = "",
+) -> None:  # fmt: skip
+    """Join films that `write_film` has written, without decoding them.
+
+    Parameters
+    ----------
+    path : path
+    parts : sequence of (int, Path)
+        The first moment of each part, in frames, and its file.
+    fps : Fraction
+    time_code : str
+        Of the first frame: "10:00:00:00".
+    comment : str
+        Stored in the file.
+
+    Raises
+    ------
+    FlarewrightError
+        A part cannot be read, or the file not be written.
+    """
+    av = _module(Path(path))
+
+    def write(temporary: Path) -> None:
+        # players begin before they have loaded all of it
+        options = {"movflags": "+faststart"}
+        with _errors_of_the_disk(av), av.open(str(temporary), "w", options=options) as container:
+            container.flags |= av.container.Flags.bitexact.value
+            container.metadata["comment"] = comment
+            joined = None
+            for moment, part in parts:
+                with opened(str(part)) as source:
+                    stream = source.streams.video[0]
+                    if joined is None:
+                        joined = container.add_stream_from_template(stream)
+                        joined.codec_context.framerate = fps
+                        if time_code:
+                            joined.metadata["timecode"] = time_code
+                    ticks = int(moment / fps / stream.time_base)
+                    for packet in source.demux(stream):
+                        if packet.dts is None:
+                            continue
+                        packet.pts, packet.dts = packet.pts + ticks, packet.dts + ticks
+                        packet.stream = joined
+                        container.mux(packet)
+
+    write_atomically(Path(path), write)
+
+
+def comment_of(path: Path) -> str:
+    """Return the comment in a film; empty if it cannot be read."""
+    try:
+        with opened(str(path)) as container:
+            return str(container.metadata.get("comment", ""))
+    except FileError:
+        return ""
+
+
+@contextmanager
+def _errors_of_the_disk(av: Any) -> Iterator[None]:
+    """Turn FFmpeg's errors, such as that of a full disk, into those of the operating system."""
+    try:
+        yield
+    except av.error.FFmpegError as error:
+        raise OSError(error.errno, error.strerror or "unknown error") from None
 
 
 def _stream(container: Any, codec: FilmCodec, size_px: tuple[int, int], fps: Fraction, pixel_aspect: float) -> Any:
