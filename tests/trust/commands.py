@@ -32,6 +32,7 @@ ARGUMENTS: dict[str, tuple[str, ...]] = {
         "out.####.exr",
         "--json",
     ),
+    "film": ("matte.####.png", "-o", "new.mp4", "--json"),
     "nuke-script": ("flare.exr", "-o", "flare.nk", "--json"),
     "dataset": ("pairs.toml", "-n", "1", "-o", "pairs", "--processes", "1", "--json"),
     "sources": ("flare.exr", "--threshold", "1e-3", "--json"),

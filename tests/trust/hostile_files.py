@@ -5,12 +5,16 @@ from __future__ import annotations
 import random
 import shutil
 import tempfile
+from fractions import Fraction
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import tifffile
 from PIL import Image
+
+from flarewright.io.films.film_writer import write_film
 
 from .answers import judged
 from .commands import ARGUMENTS
@@ -21,6 +25,8 @@ RENDER = ("render", *ARGUMENTS["render"])
 BARE = ("render", "--project", "shot.toml", "--size", "32x18", "--quality", "draft", "-o", "out.exr")
 REPLAY = ("measure", "replay", *ARGUMENTS["measure replay"])
 
+# PyAV is optional
+FILMS = ("film.mp4", "film.mov") if find_spec("av") else ()
 READERS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("lens.toml", ("lens", "check", "lens.toml", "--json")),
     ("lens.lens", ("lens", "check", "lens.lens", "--json")),
@@ -67,6 +73,7 @@ READERS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("camera.json", ("measure", "merge", *ARGUMENTS["measure merge"])),
     ("10.npy", ("measure", "merge", *ARGUMENTS["measure merge"])),
     ("merged/merged.json", ("measure", "find", "merged")),
+    *((name, ("sources", name, "--json")) for name in FILMS),
 )
 """A file and the command that reads it; the files of `hostile_flags.prepare` and those of `_more`."""
 
@@ -256,6 +263,9 @@ def _more(folder: Path) -> None:
     eight = Image.fromarray((255 * photo).astype(np.uint8))
     tifffile.imwrite(folder / "photo.tiff", (65535 * photo).astype(np.uint16))
     eight.save(folder / "photo.jpg")
+    codes = np.asarray(eight)
+    for film in FILMS:
+        write_film(folder / film, ((k, np.roll(codes, k, axis=1)) for k in range(6)), eight.size, Fraction(24))
     (folder / "place.json").write_text('{"light": [0.2, 0.1, -1.0], "size_px": [32, 18]}', "utf-8")
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import numpy as np
+from PIL import Image
 
 import flarewright as fw
 from flarewright.cli.app import run as run_command
@@ -102,6 +103,8 @@ def prepare(folder: Path) -> None:
         ghosts=(ghost,),
     )  # fmt: skip
     write_ghost_model(folder / "model.json", model)
+    for k in range(1, 4):
+        Image.fromarray(np.full((18, 32, 3), 60 * k, np.uint8)).save(folder / f"matte.{k:04d}.png")
     rows, (y, x) = ["file,constellation_deg,exposure_s,iso,f_number"], np.mgrid[:36, :64] + 0.5
     for angle in (5, 10, 15):
         light = np.exp(-0.5 * ((x - 32 - angle) ** 2 + (y - 18) ** 2)) + 0.01 * (np.hypot(x - 32 + angle, y - 18) < 6)

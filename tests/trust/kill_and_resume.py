@@ -39,6 +39,9 @@ if sys.argv[1] == "render":
     from flarewright.render.reference import estimator
     estimator.SAVE_EVERY_S = partial_picture.CHECKPOINT_S = 0.05
     partial_picture.WRITING = 1.0
+if sys.argv[1] == "film":
+    from flarewright.workflow import film
+    film._PART_FRAMES = 2
 from flarewright.cli.app import main
 main()
 """
@@ -249,6 +252,7 @@ TRIALS = {
         ("sources", "plate.####.png", "--csv", "out.csv", "--marked", "out.####.png"), ("out.csv", "out.*.png"),
         prepare=_plates,
     ),
+    "film": Trial(("film", "plate.####.png", "--force", "-o", "out.mp4"), ("out.mp4",), prepare=_plates),
     "dataset": Trial(
         ("dataset", "pairs.toml", "-n", "24", "--processes", "2", "-o", "out"), ("out/*",),
         prepare=lambda folder: (folder / "pairs.toml").write_text(PAIRS) and None,

@@ -223,7 +223,7 @@ def _frames(pattern: FramePattern, frames: str | Sequence[int] | None) -> tuple[
     if not pattern.numbered:
         path = Path(pattern.text)
         raise ProjectError(
-            f"{path} is one picture; a film has many: write {path.stem}.####{path.suffix} (or %04d, $F4)"
+            f"{path} is one picture, a film has many; write {path.stem}.####{path.suffix} (or %04d, $F4)"
         )
     there = pattern.on_disk()
     if not there:

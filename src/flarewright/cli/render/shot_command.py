@@ -138,7 +138,26 @@ def _project(options: ShotOptions, plate: PlateSettings | None) -> tuple[Project
     if sequences:
         kept = dict(project.holdout) if project.holdout is not None else {}
         project = project_of({**dict(project), "holdout": {**kept, "image": None, "depth": None, **sequences}})
+    if plate is not None:
+        found += _other_rate(options, plate, project)
     return project, [*found, *remarks]
+
+
+def _other_rate(options: ShotOptions, plate: PlateSettings, project: Project) -> list[str]:
+    """Return a remark if a project file has another rate than the plate."""
+    from ...workflow.keyframes import frame_rate
+    from ...workflow.plates.plate_files import first_picture
+    from ...workflow.shot import parsed_frames
+
+    own = first_picture(plate, parsed_frames(options.frames), project.timeline.start).fps
+    if own is None or options.project is None or options.fps is not None:
+        return []
+    if frame_rate(float(own)) == frame_rate(project.timeline.fps):
+        return []
+    return [
+        f"the plate has {float(own):.6g} frames per second and the project {project.timeline.fps:.6g}; --fps "
+        f"{float(own):.6g} takes those of the plate"
+    ]
 
 
 def _sequences(options: ShotOptions) -> tuple[ShotOptions, dict[str, str]]:

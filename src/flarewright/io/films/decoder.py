@@ -53,7 +53,7 @@ def opened(path: str) -> Iterator[Any]:
         outside(path, "a film", remedy=READS) as file,
         _plain(av),
         _not_empty(file, path),
-        av.open(file, "r", options=options, metadata_errors="replace", buffer_size=_BUFFER_BYTES) as container,
+        av.open(_Bytes(file), "r", options=options, metadata_errors="replace", buffer_size=_BUFFER_BYTES) as container,
     ):
         yield container
 
@@ -66,6 +66,29 @@ def _plain(av: Any) -> Iterator[None]:
         yield
     except failure as error:
         raise ValueError((error.strerror or "unknown error").lower()) from None
+
+
+class _Bytes:
+    """The bytes of a file for PyAV, which prints exceptions: a damaged film seeks before its start."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self.read, self.tell = file.read, file.tell
+        self._file = file
+
+    def seek(self, offset: int, origin: int = 0) -> int:
+        """Return the new place, or -1, FFmpeg's answer for an error."""
+        try:
+            return self._file.seek(offset, origin)
+        except (OSError, ValueError, OverflowError):
+            return -1
+
+    def readable(self) -> bool:
+        """Return True."""
+        return True
+
+    def seekable(self) -> bool:
+        """Return True."""
+        return True
 
 
 @contextmanager
@@ -82,7 +105,7 @@ def _most_pixels() -> int:
 
 
 def video_of(container: Any, path: str) -> Any:
-    """Return the first stream of pictures of a film, with one thread of its own.
+    """Return the first stream of pictures of a film, decoded by one thread.
 
     Raises
     ------

@@ -134,7 +134,7 @@ def _film(path: str, _: tuple[int, int]) -> Film:
         if first is None:
             raise FileError(f"{shown(path)} has no frame that can be decoded: is it a whole film?")
         coding, remarks = _coding(first, path)
-        rotation, told = _rotation(first)
+        rotation, turned = _rotation(first)
         aspect = float(stream.sample_aspect_ratio or 1)
         stated, rate = stream.frames, stream.average_rate
         # sound can be longer than the pictures
@@ -162,7 +162,7 @@ def _film(path: str, _: tuple[int, int]) -> Film:
     facts = repr((coding, rotation, aspect, (width, height))).encode()
     return Film(
         path, (width, height), frames, fps, aspect if aspect > 0.0 else 1.0, coding, rotation, code,
-        known, sha256(digest + facts).hexdigest(), times, keys, (*remarks, *told, *uneven),
+        known, sha256(digest + facts).hexdigest(), times, keys, (*remarks, *turned, *uneven),
     )  # fmt: skip
 
 
