@@ -40,8 +40,8 @@ if sys.argv[1] == "render":
     estimator.SAVE_EVERY_S = partial_picture.CHECKPOINT_S = 0.05
     partial_picture.WRITING = 1.0
 if sys.argv[1] == "film":
-    from flarewright.workflow import film
-    film._PART_FRAMES = 2
+    from flarewright.workflow.films import assembly
+    assembly._PART_FRAMES = 2
 from flarewright.cli.app import main
 main()
 """

@@ -18,8 +18,8 @@ from flarewright.io.films.film_file import open_film
 from flarewright.io.films.film_frame import read_film_frame
 from flarewright.io.images.exr import read_exr
 from flarewright.plates.settings import PlateSettings
-from flarewright.workflow import film as film_module
-from flarewright.workflow.film import assemble_film
+from flarewright.workflow.films import assembly
+from flarewright.workflow.films.assembly import assemble_film
 from flarewright.workflow.plates.plate_files import plate_frames
 from flarewright.workflow.plates.plate_sources import plate_shot
 
@@ -93,6 +93,19 @@ def test_the_film_of_the_comp_shows_the_comp(drawn):
         assert np.abs(read_film_frame(folder / "c.mp4", k).pixels - comp)[far].max() < 0.01
 
 
+def test_a_film_in_and_out_has_the_codes_and_the_tags_of_the_plate(tmp_path):
+    """Away from the light, which has all of the flare that a code can show."""
+    write_sample(tmp_path / "p.mp4", pixels="yuv444p", frames=3, rate=RATE, options=LOSSLESS)
+    for name in ("c.mp4", "c.mov"):
+        draw(tmp_path, tmp_path, frames="1001-1003", movie=tmp_path / name)
+        before, after = open_film(tmp_path / "p.mp4"), open_film(tmp_path / name)
+        assert (after.frames, after.fps, after.size_px) == (before.frames, before.fps, before.size_px)
+        assert (after.coding.matrix, after.coding.full_range, after.coding.transfer) == ("bt709", False, "rec709")
+        one, two = (read_film_frame(film.path, 2, transfer="linear").pixels for film in (before, after))
+        far = np.hypot(np.arange(SIZE[0])[None, :] - 10, np.arange(SIZE[1])[:, None] - 12) > 8
+        assert np.abs(one - two)[far].max() < 1.6 / 255
+
+
 def test_a_repeated_command_draws_nothing_and_makes_the_same_film(plates, drawn):
     folder, _ = drawn
     before = (folder / "c.mp4").read_bytes()
@@ -117,7 +130,7 @@ def test_other_frames_of_a_film_draw_all_again(plates, tmp_path):
 
 
 def test_an_interrupted_film_resumes_with_its_finished_parts(plates, tmp_path, monkeypatch):
-    monkeypatch.setattr(film_module, "_PART_FRAMES", 16)
+    monkeypatch.setattr(assembly, "_PART_FRAMES", 16)
     files = str(plates / "p.####.png")
     whole = assemble_film(files, tmp_path / "whole.mp4")
     assert (len(whole.frames), whole.fps, whole.size_px) == (48, 24, SIZE)
@@ -188,7 +201,7 @@ def test_no_film_of_another_program_is_replaced(plates, tmp_path):
 @pytest.mark.parametrize(
     ("frames", "words"),
     [
-        (None, r"lacks frame 1004; draw what is missing, or give --frames: a frame stays until the next one"),
+        (None, r"p\.####\.png, 1001-1003,1005, have gaps; draw what is missing, or give --frames: a frame stays"),
         ("1001-1009", r"lacks frames 1004,1006-1009; there are 1001-1003,1005: give frames that exist"),
     ],
 )

@@ -20,7 +20,7 @@ The command line and other front ends call these functions; nothing here prints.
 - `plates`: shots over plates: `plate_shot` finds lights, `write_comp` writes comps
 - `shot`: `shot` draws the frames of a moving project on all cores, with a `ShotResult`
 - `shot_frame`: `draw_frame`, one of them, and the digest of what made it
-- `film`: `assemble_film` makes a film of finished frames, and returns a `FilmResult`
+- `films`: films of finished frames: `assemble_film`
 - `nuke_script`: `nuke_script`, the text of a script or gizmo that composites a flare in Nuke
 - `nuke_graph`: `flare_nodes`, `nodes_text`, its nodes and their text
 - `frame_files`: `with_frame_files`, the files of one frame of sequences that hide lights

@@ -18,8 +18,8 @@ from .keyframes import frame_rate, is_still, length_s, time_of
 
 if TYPE_CHECKING:
     from ..plates.settings import PlateSettings
-    from ..render.image.display import Transform
-    from .film import FilmResult
+    from .films.assembly import FilmResult
+    from .films.look import FilmView
     from .plates.plate_sources import PlateShot
     from .shot_frame import FrameResult, ShotPlan
 
@@ -75,7 +75,7 @@ def shot(
     over: str | os.PathLike[str] | None = None,
     searched: Callable[[int, int, int], None] | None = None,
     movie: str | os.PathLike[str] | None = None,
-    movie_view: Transform | None = None,
+    movie_view: FilmView | None = None,
     movie_exposure: float | None = None,
     encoded: Callable[[int, int, int], None] | None = None,
 ) -> ShotResult:
@@ -122,7 +122,7 @@ def shot(
     movie : path, optional
         Also make a film, ".mp4" or ".mov", of the comps, or else of the flare; from the finished files.
     movie_view, movie_exposure
-        `transform` and `exposure_stops` of `film.assemble_film`.
+        `view` and `exposure_stops` of `films.assembly.assemble_film`.
     encoded : callable, optional
         Called after each frame of the film, as `searched`.
 
@@ -184,10 +184,10 @@ def shot(
     done.sort(key=lambda result: result.frame)
     film = None
     if movie is not None:
-        from .film import assemble_film
+        from .films.assembly import assemble_film
 
         film = assemble_film(
-            comp or pattern.text, movie, frames=numbers, fps=project.timeline.fps, transform=movie_view,
+            comp or pattern.text, movie, frames=numbers, fps=project.timeline.fps, view=movie_view,
             exposure_stops=movie_exposure, report=encoded,
         )  # fmt: skip
         remarks += film.remarks
@@ -208,7 +208,7 @@ def _comp_pattern(over: str | os.PathLike[str] | None, plate: PlateSettings | No
 
 def _check_movie(movie: str | os.PathLike[str], output: FramePattern, chunk: str | None) -> None:
     """Raise an error before the work if the film cannot be made of the frames."""
-    from .film import check_film
+    from .films.assembly import check_film
 
     check_film(movie)
     if chunk is not None:

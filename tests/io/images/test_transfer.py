@@ -7,7 +7,7 @@ from math import exp, log
 import numpy as np
 import pytest
 
-from flarewright.io.images.transfer import HDR_WHITE_CD_M2, TRANSFERS, decoded, white_of
+from flarewright.io.images.transfer import HDR_WHITE_CD_M2, TRANSFERS, decoded, encoded_rec709, white_of
 from flarewright.render.image.display import srgb_oetf
 
 CODES = np.linspace(0.0, 1.0, 257, dtype=np.float32)
@@ -66,6 +66,11 @@ def test_codes_rise_from_black_to_white(transfer):
     assert (np.diff(values) > 0.0).all()
     assert values[-1] == pytest.approx(white_of(transfer))
     assert decoded(np.float32([-0.1]), transfer)[0] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_camera_encodes_what_is_decoded():
+    light = np.linspace(0.0, 1.0, 257, dtype=np.float32)
+    assert decoded(encoded_rec709(light), "rec709") == pytest.approx(light, abs=1e-4)
 
 
 def test_white_paper_is_one_in_high_dynamic_range():

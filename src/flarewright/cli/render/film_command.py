@@ -12,7 +12,7 @@ from ..common import check_free, one_bar, print_json, print_remarks
 from ..progress_lines import print_line
 
 if TYPE_CHECKING:
-    from ...workflow.film import FilmResult
+    from ...workflow.films.assembly import FilmResult
 
 EPILOG = (
     "Examples:\n\nflarewright film flare.####.exr -o flare.mp4\n\n"
@@ -34,7 +34,10 @@ def film(
     layer: Annotated[str | None, typer.Option(metavar="NAME", help="Layer of EXR files (default: the sum).")] = None,
     view: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="filmic (default for a flare), srgb (default for other pictures) or aces."),
+        typer.Option(
+            metavar="NAME",
+            help="filmic (default for a flare), srgb, rec709 or aces.",
+        ),
     ] = None,
     exposure: Annotated[
         float | None,
@@ -47,13 +50,13 @@ def film(
 
     For shots that several machines have drawn; `shot --movie` does the same at the end of its work.
     """
-    from .preview import preview_look
-
     if fps is not None and not 0.0 < fps <= 1000.0:
         raise ProjectError(f"--fps {fps:g} is no frame rate: give a number above 0, such as 24 or 23.976")
-    preview_look(view=view, exposure=exposure, ev=None, shutter=None, iso=None, lux=None, no_png=False)
+    from ...workflow.films.assembly import assemble_film
+    from ...workflow.films.look import check_look
+
+    check_look(view, exposure)
     check_free(output, force)
-    from ...workflow.film import assemble_film
 
     with one_bar("film") as progress:
 
@@ -64,7 +67,7 @@ def film(
                 progress(done / of, f"frame {frame}, {done} of {of}")
 
         found = assemble_film(
-            files, output, frames=frames, fps=fps, layer=layer, transform=view,  # type: ignore[arg-type]
+            files, output, frames=frames, fps=fps, layer=layer, view=view,  # type: ignore[arg-type]
             exposure_stops=exposure, report=report,
         )  # fmt: skip
     print_remarks(list(found.remarks))

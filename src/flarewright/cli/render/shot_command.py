@@ -105,12 +105,12 @@ def shot(options: ShotOptions) -> None:
 
 def _check_movie(options: ShotOptions) -> None:
     """Check the flags of the film."""
-    from .preview import preview_look
+    from ...workflow.films.look import check_look
 
     for flag, value in (("--view", options.view), ("--exposure", options.exposure)):
         if value is not None and options.movie is None:
             raise ProjectError(f"{flag} is for the film, and none is made; add --movie FILM.mp4, or omit {flag}")
-    preview_look(view=options.view, exposure=options.exposure, ev=None, shutter=None, iso=None, lux=None, no_png=False)
+    check_look(options.view, options.exposure)
 
 
 def _parts(text: str | None) -> Literal["multi", "single"]:

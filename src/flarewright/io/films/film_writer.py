@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,9 @@ __all__ = ["FILM_CODECS", "FilmCodec", "check_film_name", "comment_of", "join_fi
 
 # quality of H.264: a difference of about one code of 255; more bits for dark gradients, which a flare consists of
 _QUALITY = (("crf", "14"), ("aq-mode", "3"), ("preset", "medium"))
-# ITU-T H.273: BT.709 colours in the limited range; sRGB codes, as all our pictures for screens have
-_BT709, _SRGB, _LIMITED = 1, 13, 1
+# numbers of ITU-T H.273: BT.709 colours in the limited range, and what the codes are
+_BT709, _LIMITED = 1, 1
+_CURVES = {"srgb": 13, "rec709": 1}
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,8 @@ class FilmCodec:
         Of the encoder.
     multiple_px : tuple of int
         Width and height are multiples of it.
+    deep : bool
+        Whether more than 8 bits of a picture matter.
     """
 
     words: str
@@ -46,13 +49,14 @@ class FilmCodec:
     pixels: str
     options: tuple[tuple[str, str], ...]
     multiple_px: tuple[int, int]
+    deep: bool = False
 
 
 FILM_CODECS = {
     # one thread: the bytes must not depend on the machine
     ".mp4": FilmCodec("H.264, 8 bits", "libx264", "yuv420p", (*_QUALITY, ("threads", "1")), (2, 2)),
     ".mov": FilmCodec(
-        "ProRes 422 HQ, 10 bits", "prores_ks", "yuv422p10le", (("profile", "hq"), ("vendor", "apl0")), (2, 1)
+        "ProRes 422 HQ, 10 bits", "prores_ks", "yuv422p10le", (("profile", "hq"), ("vendor", "apl0")), (2, 1), deep=True
     ),
 }
 """Films that are written, by their suffix."""
@@ -105,10 +109,11 @@ def padded_size(size_px: tuple[int, int], codec: FilmCodec) -> tuple[int, int]:
 
 def write_film(
     path: str | os.PathLike[str],
-    pictures: Iterable[tuple[int, NDArray[np.uint8]]],
+    pictures: Iterable[tuple[int, NDArray[Any]]],
     size_px: tuple[int, int],
     fps: Fraction,
     *,
+    transfer: Literal["srgb", "rec709"] = "srgb",
     pixel_aspect: float = 1.0,
     comment: str = "",
 ) -> None:
@@ -118,11 +123,13 @@ def write_film(
     ----------
     path : path
         ".mp4": H.264, yuv420p. ".mov": ProRes 422 HQ, 10 bits.
-    pictures : iterable of (int, ndarray of shape (H, W, 3), uint8)
-        Moments in frames from the first one, ascending, and codes of sRGB.
+    pictures : iterable of (int, ndarray of shape (H, W, 3), uint8 or uint16)
+        Moments in frames from the first one, ascending, and codes, whose largest one is white.
     size_px : tuple of int
         Of the pictures. Odd ones are extended by their last column and row.
     fps : Fraction
+    transfer : {"srgb", "rec709"}
+        What the codes are; the film states it.
     pixel_aspect : float
     comment : str
         Stored in the file.
@@ -145,10 +152,10 @@ def write_film(
             # no names of versions, so that the bytes depend on the pictures only
             container.flags |= av.container.Flags.bitexact.value
             container.metadata["comment"] = comment
-            stream = _stream(container, codec, padded_size(size_px, codec), fps, pixel_aspect)
+            stream = _stream(container, codec, padded_size(size_px, codec), fps, _CURVES[transfer], pixel_aspect)
             for moment, picture in pictures:
                 _check_size(path, picture, size_px)
-                frame = _frame(av, _padded(picture, codec), codec)
+                frame = _frame(av, _padded(picture, codec), codec, _CURVES[transfer])
                 frame.pts, frame.time_base = moment, 1 / fps
                 container.mux(stream.encode(frame))
             container.mux(stream.encode())
@@ -224,7 +231,9 @@ def _errors_of_the_disk(av: Any) -> Iterator[None]:
         raise OSError(error.errno, error.strerror or "unknown error") from None
 
 
-def _stream(container: Any, codec: FilmCodec, size_px: tuple[int, int], fps: Fraction, pixel_aspect: float) -> Any:
+def _stream(
+    container: Any, codec: FilmCodec, size_px: tuple[int, int], fps: Fraction, curve: int, pixel_aspect: float
+) -> Any:
     stream = container.add_stream(codec.encoder, rate=fps, options=dict(codec.options))
     stream.width, stream.height = size_px
     stream.pix_fmt = codec.pixels
@@ -233,13 +242,13 @@ def _stream(container: Any, codec: FilmCodec, size_px: tuple[int, int], fps: Fra
     # a second between key frames: players jump to them
     context.gop_size = max(1, round(fps))
     context.colorspace = context.color_primaries = _BT709
-    context.color_trc, context.color_range = _SRGB, _LIMITED
+    context.color_trc, context.color_range = curve, _LIMITED
     if pixel_aspect != 1.0:
         context.sample_aspect_ratio = Fraction(pixel_aspect).limit_denominator(1000)
     return stream
 
 
-def _check_size(path: Any, picture: NDArray[np.uint8], size_px: tuple[int, int]) -> None:
+def _check_size(path: Any, picture: NDArray[Any], size_px: tuple[int, int]) -> None:
     if picture.shape != (size_px[1], size_px[0], 3):
         raise OutputError(
             f"cannot write {path}: a frame has {picture.shape[1]}x{picture.shape[0]} pixels, the first one "
@@ -247,19 +256,20 @@ def _check_size(path: Any, picture: NDArray[np.uint8], size_px: tuple[int, int])
         )
 
 
-def _padded(picture: NDArray[np.uint8], codec: FilmCodec) -> NDArray[np.uint8]:
+def _padded(picture: NDArray[Any], codec: FilmCodec) -> NDArray[Any]:
     """Return a picture with its last row and column again where the codec needs them."""
     height, width = picture.shape[:2]
     wide, high = padded_size((width, height), codec)
     return np.pad(picture, ((0, high - height), (0, wide - width), (0, 0)), mode="edge")
 
 
-def _frame(av: Any, picture: NDArray[np.uint8], codec: FilmCodec) -> Any:
+def _frame(av: Any, picture: NDArray[Any], codec: FilmCodec, curve: int) -> Any:
     """Return a frame in the colours of the codec; FFmpeg converts with rounding to the nearest code."""
     names = av.video.reformatter
     flags = names.Interpolation
     exact = flags.ACCURATE_RND | flags.FULL_CHR_H_INT | flags.FULL_CHR_H_INP | flags.BITEXACT
-    frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24").reformat(
+    kind = "rgb24" if picture.dtype == np.uint8 else "rgb48le"
+    frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format=kind).reformat(
         format=codec.pixels,
         src_color_range=names.ColorRange.JPEG,
         dst_color_range=names.ColorRange.MPEG,
@@ -268,5 +278,5 @@ def _frame(av: Any, picture: NDArray[np.uint8], codec: FilmCodec) -> Any:
         threads=1,
     )
     frame.colorspace = frame.color_primaries = _BT709
-    frame.color_trc, frame.color_range = _SRGB, _LIMITED
+    frame.color_trc, frame.color_range = curve, _LIMITED
     return frame

@@ -10,7 +10,7 @@ import numpy as np
 from ...typing import Pixels
 from .picture import decode_srgb
 
-__all__ = ["HDR_WHITE_CD_M2", "TRANSFERS", "Transfer", "decoded", "white_of"]
+__all__ = ["HDR_WHITE_CD_M2", "TRANSFERS", "Transfer", "decoded", "encoded_rec709", "white_of"]
 
 Transfer = Literal["srgb", "linear", "rec709", "gamma22", "gamma28", "pq", "hlg"]
 """What the codes of a file mean: display codes of sRGB, linear values, the codes of a video camera, ..."""
@@ -59,6 +59,12 @@ def white_of(transfer: Transfer) -> float:
     (1.0, 49.26)
     """
     return float(decoded(np.ones(1, np.float32), transfer)[0])
+
+
+def encoded_rec709(light: Pixels) -> Pixels:
+    """Return the codes of linear light from 0 to 1, by the camera's curve of ITU-R BT.709; the inverse of `decoded`."""
+    found: Pixels = np.where(light < 0.018, 4.5 * light, 1.099 * np.maximum(light, 0.018) ** 0.45 - 0.099)
+    return found
 
 
 def _rec709(codes: Pixels) -> Pixels:

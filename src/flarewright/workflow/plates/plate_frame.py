@@ -158,13 +158,15 @@ def write_comp(
     settings = plate.settings
     too_dark = picture.white is not None or settings.gain > 1.0 or settings.source is not None
     whole = composed(converted(picture, project.output.colorspace), passes, mask, too_dark=too_dark)
+    # a film of the comp has the curve of its plate
+    facts = {"threshold": plate.threshold, "gain": settings.gain, "transfer": picture.transfer}
     write_exr(
         path,
         [whole],
         plate.size_px,
         pixel_type=project.output.pixel_type,
         scale=1.0,
-        metadata={**metadata, "plate": json.dumps({"threshold": plate.threshold, "gain": plate.settings.gain})},
+        metadata={**metadata, "plate": json.dumps(facts)},
         pixel_aspect=project.camera.pixel_aspect,
         colorspace=project.output.colorspace,
         compression=project.output.compression,

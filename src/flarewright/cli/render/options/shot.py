@@ -89,7 +89,7 @@ class MovieOptions:
     view: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME", help="Of the film: filmic (default for a flare), srgb (for a comp) or aces.",
+            metavar="NAME", help="Of the film: filmic (default for a flare), srgb, rec709 (as a film plate), aces.",
             rich_help_panel=MOVIE,
         ),
     ] = None  # fmt: skip

@@ -10,17 +10,17 @@ from dataclasses import dataclass
 from fractions import Fraction
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._version import __version__
-from ..errors import FlarewrightError, OutputError, ProjectError
-from ..io.files.text_file import digest_of
-from ..io.films.film_kind import is_film
-from ..io.films.film_time_code import code_text
-from ..io.films.film_writer import (
+from ..._version import __version__
+from ...errors import OutputError, ProjectError
+from ...io.files.text_file import digest_of
+from ...io.films.film_kind import is_film
+from ...io.films.film_time_code import code_text
+from ...io.films.film_writer import (
     FILM_CODECS,
     FilmCodec,
     check_film_name,
@@ -29,19 +29,16 @@ from ..io.films.film_writer import (
     padded_size,
     write_film,
 )
-from ..io.images.exr import read_exr
-from ..io.images.plate_picture import PlatePicture, read_plate
-from ..jobs.frame_list import FramePattern, frames_text, parse_frames
-from ..render.image.display import auto_exposure, layers_exposure, view, view_text
-from .keyframes import frame_rate
+from ...io.images.plate_picture import read_plate
+from ...jobs.frame_list import FramePattern, frames_text, parse_frames
+from ..keyframes import frame_rate
+from .look import FilmLook, film_look, shown
 
 if TYPE_CHECKING:
-    from ..render.image.display import Transform
+    from .look import FilmView
 
 __all__ = ["FilmResult", "assemble_film", "check_film"]
 
-# frames whose flare sets an automatic exposure
-_EXPOSED_FRAMES = 24
 _FPS = 24.0
 # frames that are encoded again after an interruption, at most
 _PART_FRAMES = 120
@@ -81,7 +78,7 @@ def assemble_film(
     frames: str | Sequence[int] | None = None,
     fps: float | None = None,
     layer: str | None = None,
-    transform: Transform | None = None,
+    view: FilmView | None = None,
     exposure_stops: float | None = None,
     report: Callable[[int, int, int], None] | None = None,
 ) -> FilmResult:
@@ -101,10 +98,9 @@ def assemble_film(
         None: as the files state, or else 24.
     layer : str, optional
         Of EXR files; None: the beauty of a flare, or the plain colours.
-    transform : {"filmic", "srgb", "aces"}, optional
-        As of `render.image.display.view`; None: filmic for a flare, srgb for comps and other pictures.
+    view : {"filmic", "srgb", "aces", "rec709"}, optional
     exposure_stops : float, optional
-        One for all frames. None: the lowest automatic exposure of the flare in 24 frames; 0 for other pictures.
+        One for all frames. None: as of `look.film_look`.
     report : callable, optional
         Called with the frame, the number of finished frames and that of all.
 
@@ -132,16 +128,15 @@ def assemble_film(
     if fps is None and first.fps is None:
         remarks.append(f"the frames state no rate; the film has {_FPS:g} frames per second; --fps sets another one")
     rate = first.fps if fps is None and first.fps is not None else frame_rate(_FPS if fps is None else fps)
-    stops, kind, automatic = _look(pattern, numbers, first, layer, transform, exposure_stops)
-    stated = view_text(stops, kind, first.colorspace or "rec709", automatic=automatic)
-    remarks += _padding(first.size_px, codec)
-
+    look = film_look([pattern.path(frame) for frame in numbers], first, layer, view, exposure_stops)
+    remarks += [*look.remarks, *_padding(first.size_px, codec)]
     code = (first.header or {}).get("timeCode")
-    film = _Film(Path(output), pattern, numbers, rate, layer, kind, stops, first.size_px, first.pixel_aspect)
-    _encode(film, "" if code is None else code_text(code), f"{_OURS}{__version__}; {stated}", report)
+    film = _Film(Path(output), pattern, numbers, rate, layer, look, first.size_px, first.pixel_aspect)
+    _encode(film, "" if code is None else code_text(code), f"{_OURS}{__version__}; {look.words}", report)
     return FilmResult(
-        os.fspath(output), numbers, rate, padded_size(first.size_px, codec), codec.words, stated, stops, tuple(remarks)
-    )
+        os.fspath(output), numbers, rate, padded_size(first.size_px, codec), codec.words, look.words, look.stops,
+        tuple(remarks),
+    )  # fmt: skip
 
 
 def check_film(output: str | os.PathLike[str]) -> None:
@@ -163,8 +158,7 @@ class _Film:
     frames: tuple[int, ...]
     fps: Fraction
     layer: str | None
-    transform: Transform
-    stops: float
+    look: FilmLook
     size_px: tuple[int, int]
     pixel_aspect: float
 
@@ -178,24 +172,16 @@ def _encode(film: _Film, code: str, comment: str, report: Callable[[int, int, in
         reason = (error.strerror or str(error)).lower()
         raise OutputError(f"cannot write {folder}: {reason}; check the free space and the permissions") from None
     parts = []
+    transfer: Literal["srgb", "rec709"] = "rec709" if film.look.view == "rec709" else "srgb"
     for at in range(0, len(film.frames), _PART_FRAMES):
         some = film.frames[at : at + _PART_FRAMES]
         part = folder / f"{at // _PART_FRAMES:05d}{film.output.suffix}"
         digest = _digest(film, some)
-        kept = part.exists() and comment_of(part) == digest
-        if not kept:
-
-            def pictures(some: Sequence[int] = some, at: int = at) -> Iterator[tuple[int, NDArray[np.uint8]]]:
-                for k, frame in enumerate(some):
-                    picture = read_plate(film.pattern.path(frame), layer=film.layer)
-                    yield (
-                        frame - some[0],
-                        view(picture.pixels, film.stops, film.transform, picture.colorspace or "rec709"),
-                    )
-                    if report is not None:
-                        report(frame, at + k + 1, len(film.frames))
-
-            write_film(part, pictures(), film.size_px, film.fps, pixel_aspect=film.pixel_aspect, comment=digest)
+        if not part.exists() or comment_of(part) != digest:
+            write_film(
+                part, _pictures(film, some, at, report), film.size_px, film.fps, transfer=transfer,
+                pixel_aspect=film.pixel_aspect, comment=digest,
+            )  # fmt: skip
         elif report is not None:
             report(some[-1], at + len(some), len(film.frames))
         parts.append((some[0] - film.frames[0], part))
@@ -208,11 +194,23 @@ def _encode(film: _Film, code: str, comment: str, report: Callable[[int, int, in
         folder.rmdir()
 
 
+def _pictures(
+    film: _Film, frames: Sequence[int], before: int, report: Callable[[int, int, int], None] | None
+) -> Iterator[tuple[int, NDArray[Any]]]:
+    """Yield the moments and the codes of frames, of which some come before them."""
+    deep = FILM_CODECS[film.output.suffix.lower()].deep
+    for k, frame in enumerate(frames):
+        picture = read_plate(film.pattern.path(frame), layer=film.layer)
+        yield frame - frames[0], shown(picture, film.look, deep=deep)
+        if report is not None:
+            report(frame, before + k + 1, len(film.frames))
+
+
 def _digest(film: _Film, frames: Sequence[int]) -> str:
     """Return a digest of all that determines a part of a film."""
     files = [digest_of(film.pattern.path(frame)) for frame in frames]
     moments = [frame - frames[0] for frame in frames]
-    about = (__version__, film.fps, film.layer, film.transform, film.stops, film.size_px, film.pixel_aspect)
+    about = (__version__, film.fps, film.layer, film.look.view, film.look.stops, film.size_px, film.pixel_aspect)
     return sha256(repr((about, moments, files)).encode()).hexdigest()
 
 
@@ -233,11 +231,9 @@ def _frames(pattern: FramePattern, frames: str | Sequence[int] | None) -> tuple[
     if frames is None:
         gaps = np.diff(there)
         if len(there) > 2 and gaps.max() > gaps.min():
-            step = int(gaps.min())
-            missing = sorted({*range(there[0], there[-1] + 1, step)} - {*there})
             raise ProjectError(
-                f"{pattern.text} lacks frame{'s'[: len(missing) > 1]} {frames_text(missing)[:80]}; draw what is "
-                "missing, or give --frames: a frame stays until the next one"
+                f"the frames of {pattern.text}, {frames_text(there)[:80]}, have gaps; draw what is missing, or give "
+                "--frames: a frame stays until the next one"
             )
         return there
     wanted = parse_frames(frames) if isinstance(frames, str) else tuple(sorted(set(frames)))
@@ -248,40 +244,6 @@ def _frames(pattern: FramePattern, frames: str | Sequence[int] | None) -> tuple[
             f"{frames_text(there)[:80]}: give frames that exist"
         )
     return wanted
-
-
-def _look(
-    pattern: FramePattern, frames: Sequence[int], first: PlatePicture, layer: str | None, transform: Transform | None,
-    exposure_stops: float | None,
-) -> tuple[float, Transform, bool]:  # fmt: skip
-    """Return the exposure of all frames, the transform, and whether the exposure is automatic."""
-    if not _is_flare(pattern.path(frames[0])):
-        return exposure_stops or 0.0, transform or "srgb", False
-    if exposure_stops is not None:
-        return exposure_stops, transform or "filmic", False
-    # one for the whole film, so that it does not flicker; at the lowest the brightest frame shows all of its ghosts
-    step = max(1, -(-len(frames) // _EXPOSED_FRAMES))
-    found = []
-    for frame in frames[::step]:
-        space = first.colorspace or "rec709"
-        if layer is None:
-            layers = read_exr(pattern.path(frame)).layers
-            if any(each.pixels.any() for each in layers):
-                found.append(layers_exposure(layers, space))
-        elif (pixels := read_plate(pattern.path(frame), layer=layer).pixels).any():
-            found.append(auto_exposure(pixels, space))
-    return min(found, default=0.0), transform or "filmic", True
-
-
-def _is_flare(path: Path) -> bool:
-    """Return whether a file is a flare of ours, which needs an exposure; a comp or a photograph has one."""
-    if path.suffix.lower() != ".exr":
-        return False
-    try:
-        contents = read_exr(path)
-    except (FlarewrightError, KeyError):
-        return False
-    return "project" in contents.metadata and "plate" not in contents.metadata
 
 
 def _padding(size_px: tuple[int, int], codec: FilmCodec) -> list[str]:
