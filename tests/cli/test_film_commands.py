@@ -39,7 +39,19 @@ def test_lights_of_a_film_are_listed_and_marked(capsys, folder):
 
 
 def test_a_film_in_and_a_film_out(capsys, folder):
-    words = ["shot", "drive.mp4", *FAST, "--start", "1001", "--threshold", "0.5", "-o", "f.####.exr"]
+    words = [
+        "shot",
+        "drive.mp4",
+        *FAST,
+        "--start",
+        "1001",
+        "--threshold",
+        "0.5",
+        "-o",
+        "f.####.exr",
+        "--processes",
+        "1",
+    ]
     assert run([*words, "--over", "c.####.exr", "--movie", "c.mp4", "--json"]) == 0
     out = capsys.readouterr()
     data = json.loads(out.out)

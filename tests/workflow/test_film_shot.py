@@ -12,7 +12,7 @@ pytest.importorskip("av", reason="the extra video: PyAV")
 
 from film_samples import LOSSLESS, SIZE, lamp, write_sample
 
-from flarewright import Camera, Light, LightKey, Project, Quality, Timeline, shot
+from flarewright import Camera, Light, LightKey, Output, Project, Quality, Timeline, shot
 from flarewright.errors import FlarewrightError
 from flarewright.io.films.film_file import open_film
 from flarewright.io.films.film_frame import read_film_frame
@@ -31,6 +31,7 @@ def project(**changes):
     fields = {
         "lens": "heliar-tronnier", "f_number": 11.0, "lights": [Light(field_deg=(0.0, 0.0), intensity=0.0)],
         "camera": Camera(size_px=SIZE), "quality": Quality(mode="draft", wavelengths=1),
+        "output": Output(starburst=False),
         "timeline": Timeline(fps=float(RATE), start=1001),
     }  # fmt: skip
     return Project(**{**fields, **changes})
@@ -56,7 +57,7 @@ def drawn(plates):
 
 def draw(plates, folder, plate="p.mp4", **changes):
     arguments = {
-        "frames": "1003-1005", "plate": PlateSettings(str(plates / plate), threshold=0.5), "processes": 1,
+        "frames": "1003-1004", "plate": PlateSettings(str(plates / plate), threshold=0.5), "processes": 1,
         "over": folder / "c.####.exr", "movie": folder / "c.mp4", **changes,
     }  # fmt: skip
     return shot(project(), folder / "f.####.exr", **arguments)
@@ -77,7 +78,7 @@ def test_a_film_has_the_lights_of_its_pictures(plates):
 def test_comps_over_a_film_are_those_over_its_pictures(plates, drawn, tmp_path):
     folder, _ = drawn
     draw(plates, tmp_path, "p.####.png", movie=None)
-    for frame in (1003, 1005):
+    for frame in (1003, 1004):
         one, two = (read_exr(each / f"c.{frame}.exr").layers[0].pixels for each in (folder, tmp_path))
         assert np.abs(one - two).max() < 0.012
 
@@ -85,9 +86,9 @@ def test_comps_over_a_film_are_those_over_its_pictures(plates, drawn, tmp_path):
 def test_the_film_of_the_comp_shows_the_comp(drawn):
     folder, result = drawn
     film = open_film(folder / "c.mp4")
-    assert (film.frames, film.fps, film.size_px) == (3, RATE, SIZE)
-    assert (result.movie.frames, result.movie.fps, result.movie.exposure_stops) == ((1003, 1004, 1005), RATE, 0.0)
-    for k in range(3):
+    assert (film.frames, film.fps, film.size_px) == (2, RATE, SIZE)
+    assert (result.movie.frames, result.movie.fps, result.movie.exposure_stops) == ((1003, 1004), RATE, 0.0)
+    for k in range(2):
         comp = np.clip(read_exr(folder / f"c.{1003 + k}.exr").layers[0].pixels, 0.0, 1.0)
         far = np.hypot(np.arange(SIZE[0])[None, :] - 10 - k, np.arange(SIZE[1])[:, None] - 12) > 6
         assert np.abs(read_film_frame(folder / "c.mp4", k).pixels - comp)[far].max() < 0.01
@@ -95,14 +96,14 @@ def test_the_film_of_the_comp_shows_the_comp(drawn):
 
 def test_a_film_in_and_out_has_the_codes_and_the_tags_of_the_plate(tmp_path):
     """Away from the light, which has all of the flare that a code can show."""
-    write_sample(tmp_path / "p.mp4", pixels="yuv444p", frames=3, rate=RATE, options=LOSSLESS)
+    write_sample(tmp_path / "p.mp4", pixels="yuv444p", frames=2, rate=RATE, options=LOSSLESS)
     for name in ("c.mp4", "c.mov"):
-        draw(tmp_path, tmp_path, frames="1001-1003", movie=tmp_path / name)
+        draw(tmp_path, tmp_path, frames="1001-1002", movie=tmp_path / name)
         before, after = open_film(tmp_path / "p.mp4"), open_film(tmp_path / name)
         assert (after.frames, after.fps, after.size_px) == (before.frames, before.fps, before.size_px)
         assert (after.coding.matrix, after.coding.full_range, after.coding.transfer) == ("bt709", False, "rec709")
-        one, two = (read_film_frame(film.path, 2, transfer="linear").pixels for film in (before, after))
-        far = np.hypot(np.arange(SIZE[0])[None, :] - 10, np.arange(SIZE[1])[:, None] - 12) > 8
+        one, two = (read_film_frame(film.path, 1, transfer="linear").pixels for film in (before, after))
+        far = np.hypot(np.arange(SIZE[0])[None, :] - 9, np.arange(SIZE[1])[:, None] - 12) > 8
         assert np.abs(one - two)[far].max() < 1.6 / 255
 
 
@@ -119,7 +120,7 @@ def test_a_repeated_command_draws_nothing_and_makes_the_same_film(plates, drawn)
 
 def test_other_frames_of_a_film_draw_all_again(plates, tmp_path):
     write_sample(tmp_path / "p.mp4", frames=6, pixels="yuv444p", rate=RATE, tags=SRGB, options=LOSSLESS)
-    how = {"over": None, "movie": None, "frames": "1001-1002"}
+    how = {"over": None, "movie": None, "frames": "1001"}
     assert all(frame.drawn for frame in draw(tmp_path, tmp_path, **how).frames)
     assert not any(frame.drawn for frame in draw(tmp_path, tmp_path, **how).frames)
     write_sample(
@@ -161,10 +162,10 @@ def test_one_exposure_shows_a_light_that_grows(tmp_path):
     light = Light(field_deg=(6.0, 3.0), keyframes=keys)
     curve = {"of": "intensity", "at_s": (0.0, 1.0), "values": (0.1, 1.0)}
     moving = project(lights=[light.replace(curves=(curve,))], timeline=Timeline(fps=24.0, start=1))
-    result = shot(moving, tmp_path / "f.####.exr", frames="1,13,25", processes=1, movie=tmp_path / "f.mov")
+    result = shot(moving, tmp_path / "f.####.exr", frames="1,25", processes=1, movie=tmp_path / "f.mov")
     assert "(automatic)" in result.movie.view
-    means = [read_film_frame(tmp_path / "f.mov", k).pixels.mean() for k in range(3)]
-    assert means[0] < 0.6 * means[1] < 0.6 * means[2]
+    dark, bright = (read_film_frame(tmp_path / "f.mov", k).pixels.mean() for k in range(2))
+    assert dark < 0.3 * bright
     # the last frame has the exposure that it would have alone
     alone = assemble_film(tmp_path / "f.####.exr", tmp_path / "g.mov", frames=[25])
     assert alone.exposure_stops == result.movie.exposure_stops
