@@ -176,7 +176,7 @@ def test_one_exposure_shows_a_light_that_grows(tmp_path):
     [
         (
             {"chunk": "1/2"},
-            r"chunk 1/2 draws some; draw all chunks without a film, then: flarewright film .*f\.####",
+            r"chunk 1/2 draws some; draw all chunks without a film, then: flarewright film .*c\.####",
         ),
         ({"movie": "c.webm"}, r"must be named \*\.mp4"),
         ({"movie": "c.####.mp4"}, "is one file; name it without a number"),

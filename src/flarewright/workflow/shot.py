@@ -156,7 +156,7 @@ def shot(
     _check_output(pattern)
     comp = _comp_pattern(over, plate, numbers)
     if movie is not None:
-        _check_movie(movie, pattern, chunk)
+        _check_movie(movie, FramePattern(comp or pattern.text), chunk)
     written = [pattern.text, comp, "" if movie is None else os.fspath(movie)]
     _keep_sequences(project, plate, [FramePattern(name) for name in written if name], numbers)
     mine = numbers if chunk is None else chunk_of(numbers, *parse_chunk(chunk))

@@ -113,6 +113,33 @@ def test_patches_of_a_subsampled_film_keep_their_colours(tmp_path):
         assert np.abs(middle - patches).max() < error
 
 
+@pytest.mark.parametrize(("name", "codec"), [("q.mov", "qtrle"), ("x.mkv", "libx264rgb"), ("p.mov", "png")])
+def test_red_green_and_blue_are_read_as_they_are(tmp_path, name, codec):
+    codes = np.arange(256, dtype=np.uint8).reshape(8, 32)[..., None] * np.ones(3, np.uint8)
+    codes[..., 1] = codes[..., 0][::-1]
+    how = {"options": LOSSLESS} if codec == "libx264rgb" else {}
+    path = write_sample(
+        tmp_path / name, codec=codec, pixels="rgb24", size=(32, 8), frames=1, tags=(2, 2, 2, 0), draw=lambda k: codes,
+        **how,
+    )  # fmt: skip
+    picture = read_film_frame(path, 0, transfer="linear")
+    assert picture.pixels == pytest.approx(codes / 255.0, abs=1e-6)
+    assert open_film(path).coding.matrix is None
+    assert read_film_frame(path, 0).transfer == "srgb"
+
+
+@pytest.mark.parametrize(("pixels", "full"), [("gray", True), ("gray10le", True), ("gray", False), ("gray10le", False)])
+def test_a_grey_film_has_its_range(tmp_path, pixels, full):
+    bits = 10 if pixels == "gray10le" else 8
+    grey = np.linspace(0.0, 1.0, 256).reshape(8, 32)
+    step = 1 << (bits - 8)
+    codes = grey * ((1 << bits) - 1) if full else 16 * step + grey * 219 * step
+    plane = np.rint(codes).astype(np.uint8 if bits == 8 else np.dtype("<u2"))
+    path = write_codes(tmp_path / "g.mkv", [plane], pixels, (1, 1, 1, 2 if full else 1))
+    found = read_film_frame(path, 0, transfer="linear").pixels
+    assert found == pytest.approx(np.repeat(grey[..., None], 3, axis=2), abs=0.6 / (219 * step))
+
+
 def test_white_is_where_the_codes_clip(tmp_path):
     hlg = write_sample(tmp_path / "h.mkv", codec="ffv1", pixels="yuv420p10le", frames=1, tags=(9, 9, 18, 1), draw=lamp)
     picture = read_film_frame(hlg, 0)

@@ -149,10 +149,10 @@ def _other_rate(options: ShotOptions, plate: PlateSettings, project: Project) ->
     from ...workflow.plates.plate_files import first_picture
     from ...workflow.shot import parsed_frames
 
-    own = first_picture(plate, parsed_frames(options.frames), project.timeline.start).fps
-    if own is None or options.project is None or options.fps is not None:
+    if options.project is None or options.fps is not None:
         return []
-    if frame_rate(float(own)) == frame_rate(project.timeline.fps):
+    own = first_picture(plate, parsed_frames(options.frames), project.timeline.start).fps
+    if own is None or frame_rate(float(own)) == frame_rate(project.timeline.fps):
         return []
     return [
         f"the plate has {float(own):.6g} frames per second and the project {project.timeline.fps:.6g}; --fps "

@@ -34,6 +34,7 @@ _PRIMARIES = {
     1: "bt709", 2: "bt709", 5: "bt470bg", 6: "smpte170m", 7: "smpte170m", 9: "bt2020", 11: "p3", 12: "p3",
 }  # fmt: skip
 _UNKNOWN, _FULL = 2, 2
+_LEAST_BITS = 8
 # films without a stated matrix: smaller ones are of the time of BT.601
 _HD_LINES = 720
 # codecs whose packets are not frames one by one
@@ -259,6 +260,8 @@ def _coding(frame: Any, path: str) -> tuple[FilmCoding, tuple[str, ...]]:
         raise FileError(f"{shown(path)} has raw pixels of a sensor ({kind.name}): develop it first")
     if any(component.is_alpha for component in kind.components) and not kind.has_palette:
         remarks.append("the film's alpha is not used")
+    if bits < _LEAST_BITS:
+        raise FileError(f"{shown(path)} has colours of {bits} bits ({kind.name}): convert it to 8 bits or more")
     matrix: str | None = None
     full = True
     if not (kind.is_rgb or kind.has_palette):

@@ -24,6 +24,7 @@ __all__ = ["read_film_frame"]
 
 # key frames that are tried, before decoding begins at the first frame
 _TRIES = 2
+_BITS = 8
 _ONE_AT_A_TIME = Lock()
 
 
@@ -107,8 +108,10 @@ def _codes(frame: Any, film: Film) -> np.ndarray:
         "interpolation": flags.BILINEAR | exact,
     }  # fmt: skip
     if film.coding.matrix is None:
-        green, blue, red = _planes(frame.reformat(format="gbrp16le", **how))
-        return np.stack((red, green, blue), axis=-1)
+        # to these two FFmpeg only moves values; to others it goes by way of Y'CbCr
+        if film.coding.bits == _BITS:
+            return np.asarray(frame.reformat(format="rgb24", **how).to_ndarray()).astype(np.uint16) * np.uint16(257)
+        return np.asarray(frame.reformat(format="rgb48le", **how).to_ndarray())
     if frame.format.name.startswith("gray"):
         (luma,) = _planes(frame.reformat(format="gray16le", **how))
         if not film.coding.full_range:

@@ -195,22 +195,26 @@ def join_films(
             container.metadata["comment"] = comment
             joined = None
             for moment, part in parts:
-                with opened(str(part)) as source:
-                    stream = source.streams.video[0]
+                for packet in _packets(part):
                     if joined is None:
-                        joined = container.add_stream_from_template(stream)
+                        joined = container.add_stream_from_template(packet.stream)
                         joined.codec_context.framerate = fps
                         if time_code:
                             joined.metadata["timecode"] = time_code
-                    ticks = int(moment / fps / stream.time_base)
-                    for packet in source.demux(stream):
-                        if packet.dts is None:
-                            continue
-                        packet.pts, packet.dts = packet.pts + ticks, packet.dts + ticks
-                        packet.stream = joined
-                        container.mux(packet)
+                    ticks = int(moment / fps / packet.time_base)
+                    packet.pts, packet.dts = packet.pts + ticks, packet.dts + ticks
+                    packet.stream = joined
+                    container.mux(packet)
 
     write_atomically(Path(path), write)
+
+
+def _packets(part: Path) -> Iterator[Any]:
+    """Yield the packets of a film; an error while they are written is not one of this film."""
+    with opened(str(part)) as source:
+        for packet in source.demux(source.streams.video[0]):
+            if packet.dts is not None:
+                yield packet
 
 
 def comment_of(path: Path) -> str:

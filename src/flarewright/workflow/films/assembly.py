@@ -171,6 +171,18 @@ def _encode(film: _Film, code: str, comment: str, report: Callable[[int, int, in
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise OutputError(f"cannot write {folder}: {reason}; check the free space and the permissions") from None
+    try:
+        _join_parts(film, folder, code, comment, report)
+    finally:
+        # with parts of an interrupted call, or files of another program, it stays
+        with suppress(OSError):
+            folder.rmdir()
+
+
+def _join_parts(
+    film: _Film, folder: Path, code: str, comment: str, report: Callable[[int, int, int], None] | None
+) -> None:
+    """Encode parts in a folder, join them, and delete them."""
     parts = []
     transfer: Literal["srgb", "rec709"] = "rec709" if film.look.view == "rec709" else "srgb"
     for at in range(0, len(film.frames), _PART_FRAMES):
@@ -186,12 +198,10 @@ def _encode(film: _Film, code: str, comment: str, report: Callable[[int, int, in
             report(some[-1], at + len(some), len(film.frames))
         parts.append((some[0] - film.frames[0], part))
     join_films(film.output, parts, film.fps, time_code=code, comment=comment)
-    # also what a killed call has left; files of other programs stay, and the folder with them
+    # also what a killed call has left
     for left in folder.iterdir():
         if re.fullmatch(r"\d{5}|\.\d{5}\.[0-9a-f]{8}\.part", left.stem) and left.suffix in FILM_CODECS:
             left.unlink(missing_ok=True)
-    with suppress(OSError):
-        folder.rmdir()
 
 
 def _pictures(
