@@ -232,3 +232,6 @@ def test_expanded_highlights_invert_a_shoulder():
     shoulder = scene / (1.0 + (1.0 - 1.0 / 50.0) * scene)
     assert expanded(shoulder, 50.0) == pytest.approx(scene, rel=1e-4)
     assert expanded(np.ones(1, np.float32), 80.0) == pytest.approx(80.0)
+    # a plate of high dynamic range clips above 1
+    above = expanded(np.array([0.01, 3.77, 5.0], np.float32), 80.0, 3.77)
+    assert above == pytest.approx([0.01, 80.0, 80.0], rel=0.01)
