@@ -180,7 +180,7 @@ def test_one_exposure_shows_a_light_that_grows(tmp_path):
         ),
         ({"movie": "c.webm"}, r"must be named \*\.mp4"),
         ({"movie": "c.####.mp4"}, "is one file; name it without a number"),
-        ({"frames": "1-3"}, r"lacks frames 1-3; it has 1001-1048: give --frames that exist, or --start"),
+        ({"frames": "1-3"}, r"lacks frames 1-3; it has 1001-1048, the first one at 0 s: give --frames that exist"),
         ({"plate": "p.####.mp4"}, "is a film, which has all frames in one file"),
     ],
 )

@@ -81,7 +81,7 @@ def _film_frames(settings: PlateSettings, frames: Sequence[int] | None) -> tuple
     if missing:
         raise ProjectError(
             f"the film {settings.files} lacks frame{'s'[: len(missing) > 1]} {frames_text(missing)[:80]}; it has "
-            f"{settings.first}-{last}: give --frames that exist, or --start, the number of its first frame"
+            f"{settings.first}-{last}, the first one at 0 s: give --frames that exist"
         )
     return tuple(frames)
 
