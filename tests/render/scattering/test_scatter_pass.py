@@ -18,6 +18,7 @@ from flarewright.render.scene.shots import make_shots
 
 GREEN = Lines(lines=((550.0, 1.0),))
 POLISH = Scatter(model="harvey-shack", roughness_nm=2.0)
+FINELY = Quality(mode="final", wavelengths=3)
 BY_CHANCE = Quality(mode="reference", wavelengths=1, bridge=False, reference_samples=2 * 128**2)
 
 
@@ -52,8 +53,8 @@ def luminance(pixels):
 
 def few(patch):
     """Gather at few points, for properties that do not depend on sampling."""
-    for name, count in (("RINGS", 12), ("SPOKES", 12), ("FAN", 8)):
-        patch.setattr(scatter_pass, name, count)
+    for name in ("FINE", "COARSE"):
+        patch.setattr(scatter_pass, name, getattr(scatter_pass, name)._replace(rings=12, spokes=12, fan=8))
 
 
 @pytest.fixture
@@ -70,7 +71,7 @@ def plain():
 
 @pytest.fixture(scope="module")
 def standard():
-    return drawn(project())
+    return drawn(project(quality=FINELY))
 
 
 @pytest.fixture(scope="module")
@@ -131,7 +132,8 @@ def test_light_is_kept():
     ripples = Scatter(model="harvey-shack", roughness_nm=2.0, correlation_um=50.0, slope=6.0)
     # near the axis, where incidence is nearly normal, for which the totals are defined
     light = Light(field_deg=(1.0, 0.5), spectrum=GREEN)
-    reported = project(scatter=ripples, camera=Camera(size_px=(480, 320)), f_number=16.0, lights=(light,))
+    view = {"camera": Camera(size_px=(480, 320)), "f_number": 16.0, "quality": FINELY}
+    reported = project(scatter=ripples, lights=(light,), **view)
     pixels, _, shots, images, tables = drawn(reported)
     area = 1.0 / float(shots[0].to_pixels[2] * shots[0].to_pixels[3])
     flux = luminance(pixels).sum() * area
@@ -175,8 +177,8 @@ def test_it_is_smooth():
     [((8.0, 4.0), 0.02), pytest.param((0.0, 0.0), 0.02, marks=pytest.mark.slow), ((35.0, -10.0), 0.08)],
 )
 def test_pixels_are_what_their_points_gather(field, close, standard):
-    reported = project(lights=(Light(field_deg=field, spectrum=GREEN),))
-    pixels, settled, shots, _, tables = standard if reported == project() else drawn(reported)
+    reported = project(lights=(Light(field_deg=field, spectrum=GREEN),), quality=FINELY)
+    pixels, settled, shots, _, tables = standard if reported == project(quality=FINELY) else drawn(reported)
     shot = shots[0]
     rng = np.random.default_rng(3)
     rows, columns = rng.integers(0, 64, 40), rng.integers(0, 96, 40)
@@ -188,6 +190,18 @@ def test_pixels_are_what_their_points_gather(field, close, standard):
     with ThreadPoolExecutor(1) as pool:
         fine = gather(settled.lens, shot, tables[0], [0], points, pool, rays=40)[0] * shot.gain
     assert luminance(pixels)[rows, columns] == pytest.approx(fine, rel=close)
+
+
+@pytest.mark.parametrize(
+    "field", [(8.0, 4.0), pytest.param((25.0, 4.0), marks=pytest.mark.slow)], ids=["inside", "beside"]
+)
+def test_a_draft_gathers_less_and_shows_the_same(field):
+    lights = (Light(field_deg=field),)
+    final, draft = (drawn(project(lights=lights, quality=Quality(mode=mode)))[0] for mode in ("final", "draft"))
+    sums = [pixels.sum(axis=(0, 1)) for pixels in (final, draft)]
+    # each channel, whose wavelengths draft and final choose otherwise
+    assert sums[1] == pytest.approx(sums[0], rel=0.03)
+    assert luminance(draft) == pytest.approx(luminance(final), rel=0.05)
 
 
 def test_general_surfaces_scatter_alike(rough_standard, few_points):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from math import ceil, log, pi
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,10 +35,6 @@ from ..scene.shot import Shot
 
 # largest number of wavelengths at which light is gathered, because it varies slowly with wavelength
 MOST_WAVELENGTHS = 3
-# rays from each point of the sensor: RAYS squared over the aperture of a surface, or over the iris
-RAYS = 16
-# nodes: circles around the direct image; directions all around, and over a picture beside the direct image
-RINGS, SPOKES, FAN = 52, 32, 24
 # radius of the first circle, pixels
 FIRST_RING = 0.25
 # share of scattered light from which a remark reports that ghosts are drawn without that loss
@@ -47,6 +43,30 @@ REPORTED_SHARE = 2e-3
 FILTER_ROWS = 2
 # wavelength with the most scatter
 SHORTEST_NM = 400.0
+
+
+class Sampling(NamedTuple):
+    """Where scattered light is gathered.
+
+    Attributes
+    ----------
+    rays : int
+        `rays` squared from each point of the sensor, over the aperture of a surface or over the iris.
+    rings : int
+        Circles of points around the direct image.
+    spokes, fan : int
+        Points of a circle: all around, and over a picture beside the direct image.
+    """
+
+    rays: int
+    rings: int
+    spokes: int
+    fan: int
+
+
+FINE = Sampling(16, 52, 32, 24)
+# a quarter of the time (docs/scatter.md)
+COARSE = Sampling(8, 36, 16, 12)
 
 __all__ = ["check_scatter", "chosen_scatter", "render_scatter", "scatter_facts", "scatter_of", "without_scattered"]
 
@@ -185,16 +205,19 @@ def render_scatter(
     """
     width, height = shots[0].size_px
     total = np.zeros((height, width, 3), dtype=np.float32)
+    sampling = COARSE if settled.project.quality.mode == "draft" else FINE
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         for shot, image, table in zip(shots, images, tables, strict=True):
-            total += _one_light(settled.lens, shot, image, table, pool)
+            total += _one_light(settled.lens, shot, image, table, sampling, pool)
     return Layer("scatter", total, (0, 0, width, height))
 
 
-def _one_light(lens: Lens, shot: Shot, image: DirectImage, tables: ScatterTables, pool: ThreadPoolExecutor) -> Pixels:
+def _one_light(
+    lens: Lens, shot: Shot, image: DirectImage, tables: ScatterTables, sampling: Sampling, pool: ThreadPoolExecutor
+) -> Pixels:
     """Gather light at nodes on circles around the direct image, and interpolate it to the picture."""
     centre = np.array(image.position_mm)
-    radii, angles, round_about = _nodes(shot, centre)
+    radii, angles, round_about = _nodes(shot, centre, sampling)
     first = log(radii[0]), (len(radii) - 1) / log(radii[-1] / radii[0])
     place = centre + radii[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     # the upright picture is the lens' frame, rotated by half a turn
@@ -202,7 +225,7 @@ def _one_light(lens: Lens, shot: Shot, image: DirectImage, tables: ScatterTables
     points = np.ascontiguousarray(-place.reshape(-1, 2) @ axes.T)
     count = len(shot.packed.wavelengths_nm)
     chosen = np.unique(np.linspace(0, count - 1, min(count, MOST_WAVELENGTHS)).round().astype(int))
-    found = gather(lens, shot, tables, [int(w) for w in chosen], points, pool)
+    found = gather(lens, shot, tables, [int(w) for w in chosen], points, pool, rays=sampling.rays)
     light = _at_all(shot.packed.wavelengths_nm, chosen, found).reshape(count, *place.shape[:2])
     rgb = shot.weights(shot.packed.wavelengths_nm, direct_spectrum(shot, lens))
     level = light.mean(axis=0)
@@ -228,7 +251,7 @@ def _at_all(wavelengths_nm: Floats, chosen: NDArray[np.intp], light: Floats) -> 
     return found
 
 
-def _nodes(shot: Shot, centre: Floats) -> tuple[Floats, Floats, bool]:
+def _nodes(shot: Shot, centre: Floats, sampling: Sampling) -> tuple[Floats, Floats, bool]:
     """Choose radii and angles of nodes around the direct image so that they cover the picture."""
     width, height = shot.size_px
     corners = np.array([[x, y] for x in (0.0, width) for y in (0.0, height)])
@@ -238,20 +261,20 @@ def _nodes(shot: Shot, centre: Floats) -> tuple[Floats, Floats, bool]:
     pixel = 1.0 / float(shot.to_pixels[2:].max())
     if (low < 0.0).all() and (high > 0.0).all():
         return (
-            np.geomspace(FIRST_RING * pixel, far, RINGS),
-            2.0 * pi * np.arange(SPOKES) / SPOKES,
+            np.geomspace(FIRST_RING * pixel, far, sampling.rings),
+            2.0 * pi * np.arange(sampling.spokes) / sampling.spokes,
             True,
         )
     near = float(np.hypot(*np.clip(0.0, low, high)))
     towards = np.arctan2(*(0.5 * (low + high))[::-1])
     turned = np.angle(np.exp(1j * (np.arctan2(seen[:, 1], seen[:, 0]) - towards)))
-    angles = towards + np.linspace(turned.min() - 1e-3, turned.max() + 1e-3, FAN)
-    return np.geomspace(max(0.999 * near, FIRST_RING * pixel), far, RINGS), angles, False
+    angles = towards + np.linspace(turned.min() - 1e-3, turned.max() + 1e-3, sampling.fan)
+    return np.geomspace(max(0.999 * near, FIRST_RING * pixel), far, sampling.rings), angles, False
 
 
 def gather(
     lens: Lens, shot: Shot, tables: ScatterTables, wavelengths: list[int], points: Floats, pool: ThreadPoolExecutor,
-    *, rays: int = RAYS,
+    *, rays: int = FINE.rays,
 ) -> Floats:  # fmt: skip
     """Gather the scattered light of a shot at points of the sensor.
 
