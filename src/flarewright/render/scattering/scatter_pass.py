@@ -64,7 +64,7 @@ class Sampling(NamedTuple):
     fan: int
 
 
-FINE = Sampling(16, 52, 32, 24)
+FINE = Sampling(16, 52, 24, 18)
 # a quarter of the time (docs/scatter.md)
 COARSE = Sampling(8, 36, 16, 12)
 
