@@ -27,6 +27,8 @@ from typing import Any
 
 import numba
 import numpy as np
+
+import flarewright
 from benchmarks.dataset import pairs
 from benchmarks.design import design
 from benchmarks.lights import area, lights, surfaces
@@ -35,8 +37,6 @@ from benchmarks.scaling import peak_mb, scaling
 from benchmarks.small import RATIOS, lost, small
 from benchmarks.suite import SIZES, suite
 from benchmarks.yardstick import RAY_SURFACES, trace_plainly
-
-import flarewright
 from flarewright.kernels.raster.polygons import blank_plane, fill_polygon
 from flarewright.model import (
     Art,

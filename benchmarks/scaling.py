@@ -19,8 +19,8 @@ from math import log
 from typing import Any
 
 import numpy as np
-from benchmarks.lights import random_lights
 
+from benchmarks.lights import random_lights
 from flarewright.model import Bare, Camera, Everywhere, Light, Output, Project, Quality
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.render.render import render
