@@ -22,6 +22,7 @@ from .lens.prescription import Element, Lens, Position, Row, Stop, Surface
 from .lens.scatter import RowScatter, Scatter
 from .project.animation import LightCurve, ProjectCurve, Timeline
 from .project.art import Art, Rule
+from .project.backplate import Backplate, PlateSearch
 from .project.camera import Camera
 from .project.design import Bounds, Design, GhostTarget
 from .project.holdout import Holdout
@@ -46,6 +47,7 @@ __all__ = [
     "D65",
     "Art",
     "AsLens",
+    "Backplate",
     "Bare",
     "BlackBody",
     "Bounds",
@@ -76,6 +78,7 @@ __all__ = [
     "Output",
     "PerRow",
     "Plate",
+    "PlateSearch",
     "Polygon",
     "Position",
     "Preset",

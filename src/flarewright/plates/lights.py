@@ -253,5 +253,6 @@ def _rectangle(per_px: Floats, moments: Floats) -> Rectangle:
     spread = per_px @ np.array([[xx, xy], [xy, yy]]) @ per_px.T
     values, axes = np.linalg.eigh(spread)
     sides = np.clip(np.sqrt(12.0 * np.maximum(values, 0.0)), LEAST_LIGHT_DEG, _WIDEST_DEG)
-    angle = degrees(np.arctan2(axes[1, 1], axes[0, 1]))
+    # a rectangle turned by half a turn is itself
+    angle = (degrees(np.arctan2(axes[1, 1], axes[0, 1])) + 90.0) % 180.0 - 90.0
     return Rectangle(size_deg=(float(sides[1]), float(sides[0])), rotation_deg=float(angle))

@@ -86,9 +86,10 @@ class ShotPlan:
 
         1 over a plate: layers have its unit, and add to it as they are.
         """
-        if self.plate is not None:
+        own = self.project.plate
+        if self.plate is not None or (own is not None and own.lit) or self.project.output.pixel_type == "float":
             return 1.0
-        return 1.0 if self.project.output.pixel_type == "float" else half_scale(peak_intensity(self.project))
+        return half_scale(peak_intensity(self.project))
 
 
 @dataclass(frozen=True)
@@ -221,7 +222,9 @@ def _digest(plan: ShotPlan, frame: int, moments: tuple[Project, ...]) -> str:
     """Return a digest of all that determines a file: version, projects, contents of their files, kind of file."""
     timeline = plan.project.timeline
     lens = moments[0].lens
-    images = {name for project in moments for name in picture_files(project)}
+    # the flare does not depend on the picture under it, which another machine may lack
+    bare = [project.replace(plate=None) for project in moments]
+    images = {name for project in bare for name in picture_files(project)}
     if is_measured(moments[0]):
         content = digest_of(str(lens))
     else:
@@ -230,7 +233,7 @@ def _digest(plan: ShotPlan, frame: int, moments: tuple[Project, ...]) -> str:
         images.update(picture_files(opened))
     made_of: dict[str, Any] = {
         "version": __version__,
-        "moments": [project.model_dump(mode="json", exclude={"lens"}) for project in moments],
+        "moments": [project.model_dump(mode="json", exclude={"lens"}) for project in bare],
         "lens": content,
         "files": {name: digest_of(name) for name in images},
         "frame": [frame, str(frame_rate(timeline.fps)), plan.open_s],

@@ -5,6 +5,7 @@ Public entry points: `registry.COMMANDS` and `registry.done`, which checks and r
 - `registry`: all commands by name, with labels for the history
 - `shot`: light, camera, iris, dirt, coating, quality
 - `light_path`: keyframes of a light's path
+- `plate`: the plate under the flare
 - `ghosts`: solo, mute, gain and tint of single ghosts
 - `design_targets`: ghost targets of the project's design
 - `lens`: the prescription: cells, rows, stop, another lens; `prescription` returns the table

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from ...errors import FlarewrightError, ProjectError
 from ...model import Project
 from ..common.messages import sentence
-from . import design_targets, ghosts, lens, light_path, shot
+from . import design_targets, ghosts, lens, light_path, plate, shot
 
 Command = Callable[..., Project]
 
@@ -25,6 +25,8 @@ COMMANDS: dict[str, tuple[str, Command]] = {
     "clear_keys": ("Remove the path", light_path.clear_keys),
     "go_to": ("Move along the path", light_path.go_to),
     "set_holdout": ("Change the occluder", shot.set_holdout),
+    "set_plate": ("Change the plate", plate.set_plate),
+    "remove_plate": ("Remove the plate", plate.remove_plate),
     "set_camera": ("Change the camera", shot.set_camera),
     "set_quality": ("Change the quality", shot.set_quality),
     "set_fields": ("Change the opening", shot.set_fields),

@@ -43,7 +43,10 @@ def add_light(project: Project) -> Project:
     x, y = project.lights[-1].field_deg
     taken = {light.name for light in project.lights}
     name = next(name for k in count(len(project.lights) + 1) if (name := f"light {k}") not in taken)
-    new = Light(name=name, field_deg=(-x, y), spectrum=BlackBody(temperature_k=3200.0))
+    # in the unit of a plate, 1 may be a million times a lamp
+    lit = project.plate is not None and project.plate.lit
+    intensity = project.lights[-1].intensity if lit else 1.0
+    new = Light(name=name, field_deg=(-x, y), spectrum=BlackBody(temperature_k=3200.0), intensity=intensity)
     return _with(project, lights=(*project.lights, new))
 
 

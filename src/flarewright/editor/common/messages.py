@@ -11,7 +11,7 @@ from ...io.files.sentences import validation_sentences
 # names of fields on the page; other fields are named by their own words, without units
 SPOKEN = {
     "n_d": "index n_d", "v_d": "Abbe number V_d", "semi_diameter": "semi-diameter", "thickness": "gap",
-    "exposure_stops": "exposure", "plate_stops": "brightness of the background", "dust_per_mm2": "dust per mm²",
+    "exposure_stops": "exposure", "plate_stops": "exposure of the plate", "dust_per_mm2": "dust per mm²",
     "scratches_per_cm2": "scratches per cm²", "scratch_um": "scratch width", "scratch_mm": "scratch length",
     "f_number": "f-number", "sensor_reflectance": "reflectance of the sensor",
     "gain.ghosts": "gain of the ghosts", "gain.starburst": "gain of the starburst", "gain.scatter": "gain of the haze",

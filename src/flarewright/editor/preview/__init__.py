@@ -7,7 +7,8 @@ Public entry points: `viewport.Screen`, `drag.Drag`, `progressive_render.sharpen
 - `drag`: `Drag` draws pictures during a drag, at a size that keeps up
 - `render_picture`: `take` renders one picture; sizes, quality and exposure
 - `picture`: `DrawnPicture`, the rendered result
-- `display_image`: exposure, look, background, JPEG and PNG
+- `display_image`: exposure, look, JPEG and PNG
+- `plate_view`: the plate under the flare, and the comp of both
 - `draft_match`: `Match`, the gains that match drafts to final pictures
 - `draft_calibration`: these gains as a function of the field angle
 - `ghost_picking`: the ghost table, ghosts under the pointer, outlines

@@ -169,7 +169,7 @@ class Drag:
         view = screen.session.view
         if isinstance(drawn, DrawnPicture):
             return pixels_of_picture(screen, drawn)
-        if view.plain and len(drawn.stars) == 1:
+        if view.plain and screen.session.project.plate is None and len(drawn.stars) == 1:
             # use the buffer directly instead of copying it into a picture
             (star,) = drawn.stars
             return view_sum(

@@ -27,6 +27,8 @@ class DrawnPicture:
     seconds : float
         Render time.
     remarks : tuple of str
+    haze : ndarray, shape (H, W, 3), or None
+        The part of `rest` that is no image of a light: scatter. None: there is none.
     grey : bool
         All surfaces reflect alike, so the brightness of ghosts is not that of the lens.
     """
@@ -38,6 +40,7 @@ class DrawnPicture:
     seconds: float
     remarks: tuple[str, ...] = ()
     grey: bool = False
+    haze: Pixels | None = None
 
     @property
     def ghost_light(self) -> Floats:

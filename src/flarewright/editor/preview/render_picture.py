@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import FlarewrightError
 from ...io.lens.library import lens_path
 from ...measure.replay.measured_project import is_measured, render_any
-from ...model import Art, Layer, Lens, Output, Project, Quality, Rule, Surface
+from ...model import Art, Backplate, Layer, Lens, Output, Project, Quality, Rule, Surface
 from ...render.ghosts.ring_tables import table_obstacle
 from ...render.ghosts.traced_ghosts import SCREEN_PX
 from ...render.image.display import auto_exposure
@@ -34,6 +34,8 @@ SOON_WAVELENGTHS = 7
 SOON_TOLERANCE_PX = SCREEN_PX
 # the same for the traced preview
 HASTY_TOLERANCE_PX = 2.0
+# any plate with the lights of a project
+_ANY_LIT = Backplate(image="any", lights_above=1.0)
 NO_RINGS = (
     "the screen leaves out rings inside ghosts, which are slow with an image, dirt, cylinders or spectral lines; "
     "files have them"
@@ -174,10 +176,12 @@ def take(
     parts = [layer for layer in rendering.layers if layer.name != "beauty"]
     ghosts = spread_layers([layer for layer in parts if layer.name.startswith("ghosts")], size)
     rest = spread_layers([layer for layer in parts if not layer.name.startswith("ghosts")], size)
+    scattered = [layer for layer in parts if not layer.name.startswith(("ghosts", "starburst"))]
+    haze = spread_layers(scattered, size) if scattered else None
     reported = rendering.remarks
     if grade == "final" and _slow_rings(stage.replace(quality=project.quality)):
         reported = (*reported, NO_RINGS)
-    return DrawnPicture(project, grade, ghosts, rest, time.perf_counter() - started, reported)
+    return DrawnPicture(project, grade, ghosts, rest, time.perf_counter() - started, reported, haze=haze)
 
 
 def moving_stage(project: Project, scale: float, levels: Levels) -> Project:
@@ -264,8 +268,12 @@ def same_ghosts(one: Project, other: Project) -> bool:
 
 
 def pictured(project: Project) -> Project:
-    """Return the part of a project that determines its picture: without targets, paths and curves."""
-    found: Project = still(project).replace(design=None)
+    """Return the part of a project that determines its picture: without targets, paths and curves.
+
+    Of a plate only whether the lights have its unit counts, which decides how the flare is exposed.
+    """
+    lit = project.plate is not None and project.plate.lit
+    found: Project = still(project).replace(design=None, plate=_ANY_LIT if lit else None)
     return found
 
 

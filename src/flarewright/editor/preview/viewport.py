@@ -21,10 +21,11 @@ from ..session.image_files import in_short
 from ..session.session import Session
 from ..session.view_settings import View
 from . import render_picture
-from .display_image import jpeg, pixels_of, plate_for
+from .display_image import jpeg, pixels_of
 from .draft_match import Match
 from .ghost_picking import PickableGhosts
 from .picture import DrawnPicture
+from .plate_view import comp_of, is_lit, plate_for, plate_under
 
 # JPEG quality of a picture at rest
 QUALITY = 92
@@ -234,7 +235,7 @@ def _render_inputs(project: Project, view: View) -> tuple[Project, View]:
     """Return the parts of a project and a view that determine the rendered light."""
     return (
         render_picture.pictured(project),
-        view.replace(exposure_stops=None, found_stops=None, look="srgb", plate=None, plate_stops=0.0),
+        view.replace(exposure_stops=None, found_stops=None, look="srgb", plate_stops=0.0, plate_shown=True),
     )
 
 
@@ -256,9 +257,17 @@ def shown_pixels(screen: Screen) -> NDArray[np.uint8]:
 def pixels_of_picture(screen: Screen, picture: DrawnPicture) -> NDArray[np.uint8]:
     """Return sRGB pixels of a picture with the session's view settings."""
     view = screen.session.view
-    if view.plain:
+    under = plate_under(picture, screen.session.project.plate)
+    if view.plain and under is None:
         gain = render_picture.ghost_gain(picture, screen.match)
         return view_sum(picture.ghosts, picture.rest, screen.exposure_stops, ghost_gain=gain, transform=view.look)
     light = render_picture.chosen_light(picture, screen.match)
-    plate = plate_for(view, (light.shape[1], light.shape[0]))
-    return pixels_of(light, screen.exposure_stops, view, plate)
+    if is_lit(under) and not picture.grey:
+        # flare and plate have one unit, and so one exposure
+        if view.plate_shown:
+            plate = plate_for(under, (light.shape[1], light.shape[0]))
+            assert plate is not None
+            light = comp_of(picture, render_picture.ghosts_of(picture, screen.match), plate)
+        return pixels_of(light, view.plate_stops, view)
+    plate = plate_for(under, (light.shape[1], light.shape[0])) if view.plate_shown else None
+    return pixels_of(light, screen.exposure_stops, view, None if plate is None else plate.pixels)

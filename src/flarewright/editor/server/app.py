@@ -42,6 +42,7 @@ from ..preview.ghost_picking import ghost_csv
 from ..preview.viewport import packed_pixels, shown_pixels
 from ..session import files
 from ..session.image_files import in_short
+from ..session.plate_finder import outlined
 from .access import Access, Guard, SafeHeaders
 from .messages import brief, object_of
 from .page_state import ghost_rows
@@ -362,6 +363,24 @@ def _save(workspace: Workspace, _request: Request, body: Any) -> Any:
     return workspace.state() | {"reported": f"Saved {path}"}
 
 
+def _plate_lights(workspace: Workspace, request: Request, _body: Any) -> Any:
+    def progress(_part: float, _what: str) -> None:
+        if request.state.left.is_set():
+            raise Left
+
+    return outlined(workspace.session, progress)
+
+
+def _find(workspace: Workspace, _request: Request, _body: Any) -> Any:
+    workspace.finder.start()
+    return workspace.state()
+
+
+def _stop_finding(workspace: Workspace, _request: Request, _body: Any) -> Any:
+    workspace.finder.stop()
+    return workspace.state()
+
+
 def _command(workspace: Workspace, _request: Request, _body: Any) -> Any:
     if workspace.session.file is None or not workspace.session.clean:
         raise ProjectError("save the project first: the command renders the file")
@@ -460,12 +479,13 @@ _GET = {
     "/api/coating": _coating, "/api/map": _colour_map, "/api/mask": _mask,
     "/api/places": _places, "/api/library": _library,
     "/api/thumbnail/{kind}/{name}": _thumbnail, "/api/glasses": _glasses, "/api/command": _command,
-    "/api/export/{kind}": _export, "/api/candidate/{k}": _candidate,
+    "/api/export/{kind}": _export, "/api/plate/lights": _plate_lights, "/api/candidate/{k}": _candidate,
 }  # fmt: skip
 _POST = {
     "/api/do": _do, "/api/view": _view, "/api/undo": _undo, "/api/redo": _redo, "/api/expose": _expose,
     "/api/rest": _rest, "/api/import": _import, "/api/open": _open, "/api/save": _save, "/api/solve": _solve,
     "/api/colors": _colors, "/api/stop": _stop, "/api/accept": _accept,
+    "/api/plate/find": _find, "/api/plate/stop": _stop_finding,
 }  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from ..preview.render_picture import pictured, rest_size, same_ghosts, view_size
 from ..preview.viewport import Screen
 from ..session.history import History, before_mask, design_before_added, design_before_scratch
 from ..session.measured_project import measured_facts, measured_lens
+from ..session.plate_finder import PlateFinder
 
 
 def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
@@ -55,6 +56,7 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
         "dirt": project.dirt.model_dump(mode="json"),
         "starburst": project.starburst.model_dump(mode="json"),
         "holdout": None if project.holdout is None else project.holdout.model_dump(mode="json"),
+        "plate": None if project.plate is None else project.plate.model_dump(mode="json") | {"lit": project.plate.lit},
         "path_s": length_s(project),
         "coating": coating_text(project),
         "quality": project.quality.model_dump(mode="json"),
@@ -96,6 +98,12 @@ def picture_of(screen: Screen) -> dict[str, Any]:
     return _picture(screen) | {"stops": round(screen.exposure_stops, 2)}
 
 
+def finding_of(finder: PlateFinder) -> dict[str, Any]:
+    """Return the progress of the search for lights in the plate."""
+    state = finder.state
+    return {"running": state.running, "part": round(state.part, 3), "words": state.words}
+
+
 def solve_of(solver: Solver) -> dict[str, Any]:
     """Return the progress of the search."""
     progress = solver.fitting
@@ -128,7 +136,8 @@ def _light(project: Project, k: int) -> dict[str, Any]:
     return {
         "name": light.name, "field_deg": list(light.field_deg), "intensity": light.intensity,
         "spectrum": spectrum_text(light.spectrum) or light.spectrum.kind, "diameter_deg": light.diameter_deg,
-        "distance": light.distance, "shape": None if light.shape is None else light.shape.kind,
+        "distance": light.distance, "shape": None if light.shape is None else light.shape.model_dump(mode="json"),
+        "starburst": light.starburst,
         "keys": [{"at_s": key.at_s, "field_deg": list(key.field_deg)} for key in light.keyframes],
         "holdout": None if light.holdout is None else light.holdout.model_dump(mode="json"),
     }  # fmt: skip

@@ -9,13 +9,13 @@ from ...errors import FlarewrightError, ProjectError
 from ...io.files.state_folder import state_folder
 from ...io.images.mask_image import read_mask
 from ...io.images.plate_image import read_depth, read_matte
+from ...model import Backplate
 from ...render.scene.looks import with_look
 from ..commands.lens import choose_lens
 from ..commands.shot import iris_of
-from ..preview.display_image import plate_for
+from ..preview.plate_view import plate_for
 from ..session.files import imported
 from ..session.session import Session
-from ..session.view_settings import View
 
 MOST_BYTES = 256 * 2**20
 
@@ -30,7 +30,7 @@ def take_in(session: Session, name: str, data: bytes, use: str = "", light: int 
         Name of the file.
     data : bytes
     use : str
-        Use of a picture: "mask" of the iris, "dirt", "image" or "depth" of an occluder; else the background.
+        Use of a picture: "mask" of the iris, "dirt", "image" or "depth" of an occluder; else the plate under the flare.
     light : int, optional
         Light of the occluder; None: all lights.
 
@@ -54,7 +54,7 @@ def take_in(session: Session, name: str, data: bytes, use: str = "", light: int 
             # hide the internal path from the message
             raise type(error)(str(error).replace(found.picture, Path(name).name)) from None
     elif use:
-        raise ProjectError(f"{name} is no picture; give a PNG, JPEG or EXR file")
+        raise ProjectError(f"{name} is no picture; give a PNG, JPEG, TIFF or EXR file")
     elif found.project is not None:
         session.put(found.project, f"Import {name}", begins=True)
     elif found.look is not None:
@@ -81,8 +81,8 @@ def _use_picture(session: Session, picture: str, use: str, light: int | None) ->
         read_depth(picture)
         session.do("set_holdout", {"light": light, "values": {"depth": picture}})
     else:
-        plate_for(View(plate=picture), (16, 16))
-        session.set_view({"plate": picture})
+        plate_for(Backplate(image=picture), (16, 16))
+        session.do("set_plate", {"values": {"image": picture}})
     return ()
 
 

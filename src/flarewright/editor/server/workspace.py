@@ -16,9 +16,10 @@ from ..design.search_job import DisplaySettings, Solver
 from ..preview.drag import Drag
 from ..preview.progressive_render import sharpen
 from ..preview.viewport import Screen
+from ..session.plate_finder import PlateFinder
 from ..session.session import Session
 from .messages import object_of
-from .page_state import picture_of, solve_of, state_of
+from .page_state import finding_of, picture_of, solve_of, state_of
 from .thumbnails import ThumbnailMaker
 from .turns import Crowded, Turns
 
@@ -62,6 +63,7 @@ class Workspace:
         self.session, self.greeting = session, greeting
         self.screen = Screen(session, sharpen)
         self.solver = Solver(session, lambda: DisplaySettings(session.view, self.screen.exposure_stops))
+        self.finder = PlateFinder(session)
         self.drag = Drag(self.screen)
         self.screen.idle = self.drag.prepare
         # page of the latest drag, and the number of sockets of drags
@@ -85,6 +87,8 @@ class Workspace:
             event = {"type": kind, **picture_of(self.screen)}
         elif kind == "solve":
             event = {"type": kind, **solve_of(self.solver)}
+        elif kind == "finding":
+            event = {"type": kind, **finding_of(self.finder)}
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._post, event)
 
@@ -123,6 +127,7 @@ class Workspace:
         """Ask drawing, searching and exporting to end soon."""
         self.solver.close()
         self.screen.close()
+        self.finder.close()
         self.thumbnails.close()
         for turns in (self.questions, self.changes, self.drags):
             turns.end()
@@ -141,7 +146,7 @@ class Workspace:
 
     def state(self) -> dict[str, Any]:
         """Return the state of the page."""
-        return state_of(self.screen, self.solver)
+        return state_of(self.screen, self.solver) | {"finding": finding_of(self.finder)}
 
 
 async def received(socket: WebSocket) -> str | bytes:

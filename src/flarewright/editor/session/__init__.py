@@ -9,6 +9,7 @@ Public entry points: `session.begin`, `session.Session`.
 - `autosave_lock`: `AutosaveWriter` writes it on a thread and locks it against other editors
 - `view_settings`: `View`, settings of the screen
 - `measured_project`: projects of measured flares
+- `plate_finder`: `PlateFinder` finds the lights of the plate on a thread
 - `reach`: `Reach`, the files that the page may open and save
 - `image_files`: pictures that a project reads, and messages on missing ones
 - `input_notes`: messages on clamped input

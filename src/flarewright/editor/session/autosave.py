@@ -108,7 +108,8 @@ def read_autosave(path: Path) -> Saved | None:
         at = int(data["at"])
         if not 0 <= at < len(moments):
             return None
-        view = View.model_validate(data["view"])
+        # older autosaves have the path of a background
+        view = View.model_validate({key: value for key, value in data["view"].items() if key != "plate"})
         return Saved(History(moments, at), view, data["file"], bool(data["clean"]), dict(data.get("stamps", {})))
     except Exception:
         # a damaged autosave must not prevent the start, whatever its bytes make the readers raise

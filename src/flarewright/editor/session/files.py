@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from ...io.files.file_kind import LENS_SUFFIXES, kind_of
 from ...io.files.text_file import read_toml
 from ...io.images.exr import write_exr
 from ...io.images.half import exr_scale
+from ...io.images.plate_picture import PLATE_SUFFIXES
 from ...io.lens.lens_writer import format_lens
 from ...io.lens.library import lens_path, library_name, near_names
 from ...io.measurement.ghost_model_file import is_ghost_model_file
@@ -37,7 +39,7 @@ SAMPLE_DEG = (-9.0, 5.0)
 # defaults of a new project: image position of the light, and stops below wide open for the user's own lenses
 PLACE_MM = (10.5, 5.6)
 F_NUMBER = 8.0
-PICTURES = (".exr", ".png", ".jpg", ".jpeg")
+PICTURES = PLATE_SUFFIXES
 SUFFIXES: dict[str, str] = {
     "exr": ".exr", "png": ".png", "lens": ".lens.toml", "project": ".toml", "look": ".look.toml", "csv": ".csv",
 }  # fmt: skip
@@ -198,12 +200,13 @@ def imported(
     if suffix not in (*LENS_SUFFIXES, *PICTURES):
         raise LensError(
             f"{plain} cannot be opened here: drop a lens (.toml, .lens, .zmx, .seq, .len, .dat, .csv, .json), a "
-            "measured flare (.json), a project or a look (.toml), or a background picture (.exr, .png, .jpg)"
+            "measured flare (.json), a project or a look (.toml), or a photograph (.exr, .tif, .png, .jpg)"
         )
     # a new file name for new contents, so that undo finds the old picture
     folder = folder / hashlib.sha256(data).hexdigest()[:12]
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / plain
+    # signs that stand for the number of a frame in other names
+    path = folder / re.sub(r"[#$%]", "_", plain)
     write_atomically(path, lambda temporary: _write_bytes(temporary, data))
     if suffix in PICTURES:
         return Imported(picture=str(path))

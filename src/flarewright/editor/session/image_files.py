@@ -35,6 +35,8 @@ def pictures(project: Project) -> tuple[Named, ...]:
         (None if iris is None else iris.mask, "iris image", "Iris"),
         (project.dirt.image, "drawing of dirt", "Iris"),
     ]
+    if project.plate is not None:
+        found.append((project.plate.image, "plate", "Light"))
     for holdout in (project.holdout, *(light.holdout for light in project.lights)):
         if holdout is not None:
             found += [(holdout.image, "matte", "Light"), (holdout.depth, "depth plate", "Light")]

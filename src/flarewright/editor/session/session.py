@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from ...errors import FlarewrightError, ProjectError
 from ...io.files.door import expanded
+from ...io.images.plate_picture import read_plate
 from ...model import Project
 from ..commands.lens import table_of
 from ..commands.registry import done
@@ -20,7 +21,7 @@ from ..common.messages import sentence
 from . import history as past
 from .autosave import Saved, autosave_path, read_autosave, set_aside
 from .autosave_lock import AutosaveWriter, claim, claim_last
-from .files import open_any, opened, project_path, sample_project, save_project, stamp_of
+from .files import PICTURES, open_any, opened, project_path, sample_project, save_project, stamp_of
 from .input_notes import correction
 from .reach import Reach
 from .view_settings import View
@@ -94,13 +95,16 @@ class Session:
                 )
             self._check_lens(name, values)
             project, label = done(self.project, name, values)
+            project = _on_plate(self.project, project)
             self.reach.check_project(project, self.project)
             self._move(past.committed(self.history, project, label, group, file=self.file))
             return "" if group else correction(name, values, project)
 
-    def put(self, project: Project, label: str, *, begins: bool = False) -> None:
-        """Add a project to the history; `begins`: it is another project, not an edit."""
+    def put(self, project: Project, label: str, *, begins: bool = False, placed: bool = False) -> None:
+        """Add a project to the history; `begins`: it is another project, not an edit; `placed`: so are its lights."""
         with self.lock:
+            if not begins and not placed:
+                project = _on_plate(self.project, project)
             self.reach.check_project(project, self.project)
             self._move(past.committed(self.history, project, label, file=self.file, begins=begins))
 
@@ -126,8 +130,6 @@ class Session:
                 view = self.view.replace(**values)
             except ValidationError as error:
                 raise ProjectError(sentence(error)) from None
-            if view.plate is not None and view.plate != self.view.plate:
-                self.reach.check(view.plate)
             self.view = view
             self._changed()
 
@@ -187,6 +189,9 @@ class Session:
         """Open another project or lens, as a step of the history."""
         with self.lock:
             self.reach.check_name(text.strip())
+            if expanded(text.strip()).suffix.lower() in PICTURES:
+                self._open_picture(expanded(text.strip()))
+                return
             project, file, stamps = _stamped(partial(opened, allowed=self.reach.check_project), text)
             if file is not None:
                 self._set_contents(file, project)
@@ -197,6 +202,11 @@ class Session:
                 # the project is unchanged, but a picture that it names may exist now
                 self._changed()
             self._move(history)
+
+    def _open_picture(self, path: Path) -> None:
+        """Put a picture under the flare, read where it lies."""
+        read_plate(path)
+        self.do("set_plate", {"values": {"image": str(path.resolve())}})
 
     def _set_contents(self, file: str, project: Project | None) -> None:
         if project is not None:
@@ -217,6 +227,16 @@ class Session:
         saved = Saved(self.history, self.view, self.file, self.clean, dict(self._stamps))
         warning = {"type": "message", "kind": "warning"}
         self.writer.keep(saved, lambda why: self.tell(warning | {"text": f"The autosave failed: {why}"}))
+
+
+def _on_plate(before: Project, after: Project) -> Project:
+    """Return a changed project whose lights stay where they are in its plate."""
+    if after.plate is None or not after.plate.lit:
+        return after
+    # imports SciPy, which the editor does not need without a plate
+    from ...workflow.plates.found_lights import kept_on_plate
+
+    return kept_on_plate(before, after)
 
 
 def _contents_of(file: str, stamps: dict[str, str]) -> Project | None:

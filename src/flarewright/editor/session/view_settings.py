@@ -26,10 +26,10 @@ class View(Frozen):
     unclipped : bool
         The first surface has no rim, so that ghosts hidden at this angle are visible; drawn by matrices.
     safe_frame : bool
-    plate : str or None
-        Path of a background picture.
+    plate_shown : bool
+        Whether the project's plate lies under the flare.
     plate_stops : float
-        Its brightness.
+        Exposure of the plate, and of a flare in its unit.
     """
 
     exposure_stops: float | None = Field(None, ge=-60.0, le=60.0)
@@ -38,10 +38,10 @@ class View(Frozen):
     grey: bool = False
     unclipped: bool = False
     safe_frame: bool = False
-    plate: str | None = None
+    plate_shown: bool = True
     plate_stops: float = Field(0.0, ge=-30.0, le=30.0)
 
     @property
     def plain(self) -> bool:
-        """Whether `render.image.display.view` shows the picture: a plain look without a background."""
-        return self.look in ("srgb", "filmic") and self.plate is None
+        """Whether `render.image.display.view` has the look."""
+        return self.look in ("srgb", "filmic")

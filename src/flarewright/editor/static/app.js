@@ -26,7 +26,7 @@ const $ = (id) => document.getElementById(id);
 const ghostsOf = (s) => JSON.stringify([s.lens.name, s.lens.rows.map((row) => row.stop)]);
 const placesOf = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.view.grey, s.view.unclipped]);
 // display settings of the target picture, shared with the picture
-const seenOf = (s) => JSON.stringify([s.view.look, s.view.stops, s.view.plate, s.view.plate_stops, s.view.grey, s.view.unclipped]);
+const seenOf = (s) => JSON.stringify([s.view.look, s.view.stops, s.plate, s.view.plate_shown, s.view.plate_stops, s.view.grey, s.view.unclipped]);
 const shotOf = (s) => JSON.stringify([s.lights, s.lens, s.camera, s.iris, s.dirt, s.coating, s.pass_gain, s.by_hand, s.view.grey, s.view.unclipped]);
 let known = {};
 // the server's state, without the page's pending changes
@@ -71,8 +71,8 @@ app.take = take;
 // Restore the server's state: drop changes that were rejected or lost.
 app.back = () => {
   if (!plain) return;
-  const { picture, solve } = app.state ?? plain;
-  app.state = Object.assign(structuredClone(plain), { picture, solve });
+  const { picture, solve, finding } = app.state ?? plain;
+  app.state = Object.assign(structuredClone(plain), { picture, solve, finding });
   Object.assign(app.state.view, asked);
   if (plainGhosts) app.ghosts = structuredClone(plainGhosts);
   update();
@@ -96,6 +96,11 @@ app.refreshPanel = () => {
   if (live && lights) writeLights(lights);
 };
 const fileName = (state) => (state.file ? state.file.split(/[\\/]/).pop() : state.lens.name);
+
+// Over a plate whose lights are those of the project, flare and plate have one exposure.
+const stopsOf = (s) => (s.plate?.lit ? s.view.plate_stops : s.view.stops);
+const expose = (stops) => app.setView(app.state.plate?.lit ? { plate_stops: stops } : { exposure_stops: stops });
+const autoExpose = () => (app.state.plate?.lit ? app.setView({ plate_stops: 0 }) : app.ask('api/expose'));
 
 // All changes of the project go through one queue, so that the last change wins, and save, undo and search use what
 // the page shows.
@@ -141,6 +146,7 @@ app.ask = async (path, body) => {
   } catch (error) { complain(error, path); return null; }
 };
 // Bypasses the queue, to end a search at once.
+app.postNow = post;
 app.stopSolving = async () => { try { take(await post('api/stop')); } catch (error) { complain(error); } };
 // Undo or redo during playback does not store the stopped position: a new step would clear the redo list.
 app.step = async (path) => {
@@ -235,9 +241,9 @@ function header() {
   look.addEventListener('change', () => app.setView({ look: look.value }));
   const exposure = slider({
     label: 'Exposure', tip: 'In stops: each stop doubles the light. Changes the screen only, no file.', min: -6, max: 30, step: 0.1, digits: 1, name: 'exposure',
-    get: (s) => s.view.stops, set: (value) => app.setView({ exposure_stops: value }),
+    get: stopsOf, set: (value) => expose(value),
   });
-  const auto = button('Auto', () => app.ask('api/expose'), { tip: 'Set the exposure so that ghosts are visible (A). It is constant while the light moves, so brightness can be compared.' });
+  const auto = button('Auto', autoExpose, { tip: 'Set the exposure so that ghosts are visible (A). It is constant while the light moves, so brightness can be compared.' });
   const exposed = exposure.element;
   exposed.className = 'exposure';
   $('bar').append(
@@ -259,7 +265,7 @@ function header() {
       look.children[2].disabled = !state.aces;
       look.children[2].textContent = state.aces ? 'ACES' : 'ACES (pip install opencolorio)';
       exposure.update(state);
-      auto.classList.toggle('on', state.view.exposure_stops === null);
+      auto.classList.toggle('on', state.plate?.lit ? state.view.plate_stops === 0 : state.view.exposure_stops === null);
     },
   };
 }
@@ -389,6 +395,7 @@ app.open = (tab) => {
   app.view.annotate = tab === 'target';
   if (tab !== 'target') app.view.compare = 'physical';
   panels[tab].shown?.();
+  panels.light.open(tab === 'light');
   if (app.state) { app.refreshPanel(); app.places(); }
   $('page').scrollTop = scrolled[tab] ?? 0;
   app.view.redraw();
@@ -409,7 +416,7 @@ function tabs() {
 const KEYS = [
   ['Drag', 'move the light, also out of the frame'], ['Click', 'choose the ghost under the pointer'],
   ['Scroll on it', 'step through the ghosts there'], ['Scroll', 'zoom, also PgUp and PgDn'], ['Alt + drag', 'pan, also the middle button and Ctrl + arrows'],
-  ['Arrows', 'move the light by 0.1°, Shift 1°'], ['F', 'fit the frame'], ['Z', 'zoom to 1:1'], ['A', 'automatic exposure'], ['+  −', 'exposure by half a stop'],
+  ['Arrows', 'move the light by 0.1°, Shift 1°'], ['Delete', 'remove the chosen light'], ['F', 'fit the frame'], ['Z', 'zoom to 1:1'], ['A', 'automatic exposure'], ['+  −', 'exposure by half a stop'],
   ['V', 'next view'], ['G', 'grey: equal reflectances'], ['E', 'no entrance clipping'], ['H', 'safe frame'],
   ['S', 'solo the chosen ghost'], ['M', 'mute the chosen ghost'], ['N  P', 'next, previous ghost of the list'],
   ['T', 'play the light’s path, stop'], ['K', 'key the light at this time'], [', .', 'previous, next key'],
@@ -430,6 +437,8 @@ function nudge(dx, dy, big) {
   Object.assign(ahead, { asked: ahead.asked + 1, light: app.light, place: light.field_deg });
   app.lively('move_light', { light: app.light, x: light.field_deg[0], y: light.field_deg[1] }, nudging).finally(() => { ahead.asked -= 1; });
 }
+// Only where the keys work on the picture: in a list, Delete has another meaning.
+const removeLight = () => { if (document.activeElement === $('view') && app.state.lights.length > 1) app.command('remove_light', { light: app.light }).catch(() => {}); };
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const PAN_PX = 40;
 addEventListener('keyup', (event) => { if (event.key.startsWith('Arrow')) nudging = null; if (event.key === ' ') app.view.space = false; });
@@ -455,11 +464,11 @@ addEventListener('keydown', (event) => {
   if (event.key === ' ' && onPage) { event.preventDefault(); app.view.space = true; return; }
   const looks = ['filmic', 'srgb', ...(app.state.aces ? ['aces'] : []), 'false-colour'];
   const work = {
-    f: () => app.view.fit(), z: () => app.view.fit(app.state.frame.full[0] / app.view.frame().w * app.view.zoom / (devicePixelRatio || 1)), a: () => app.ask('api/expose'),
-    '+': () => app.setView({ exposure_stops: view.stops + 0.5 }), '=': () => app.setView({ exposure_stops: view.stops + 0.5 }), '-': () => app.setView({ exposure_stops: view.stops - 0.5 }),
+    f: () => app.view.fit(), z: () => app.view.fit(app.state.frame.full[0] / app.view.frame().w * app.view.zoom / (devicePixelRatio || 1)), a: autoExpose,
+    '+': () => expose(stopsOf(app.state) + 0.5), '=': () => expose(stopsOf(app.state) + 0.5), '-': () => expose(stopsOf(app.state) - 0.5),
     v: () => app.setView({ look: looks[(looks.indexOf(view.look) + 1) % looks.length] }), g: () => app.setView({ grey: !view.grey }),
     e: () => app.setView({ unclipped: !view.unclipped }), h: () => app.setView({ safe_frame: !view.safe_frame }),
-    s: () => panels.ghosts.solo(), m: () => panels.ghosts.mute(), n: () => panels.ghosts.step(1), p: () => panels.ghosts.step(-1),
+    Delete: removeLight, Backspace: removeLight, s: () => panels.ghosts.solo(), m: () => panels.ghosts.mute(), n: () => panels.ghosts.step(1), p: () => panels.ghosts.step(-1),
     t: () => app.player.toggle(), k: () => app.player.key(), ',': () => app.player.step(-1), '.': () => app.player.step(1),
     '[': () => app.view.moveWipe(-0.05), ']': () => app.view.moveWipe(0.05), x: () => fold.click(), w: () => { app.open('target'); panels.target.next(); }, o: openFile, '?': help, Escape: () => app.choose(null),
   }[event.key.length === 1 ? event.key.toLowerCase() : event.key];
@@ -524,6 +533,14 @@ function hear(event) {
     if (event.number !== app.view.shownNumber) app.view.refresh(true);
     update();
     if (event.grade === 'working') app.view.refreshTarget();
+  }
+  if (event.type === 'finding') {
+    const ended = state.finding.running && !event.running;
+    state.finding = event;
+    if (ended) panels.light.searched();
+    panels.light.update(state);
+    app.view.redraw();
+    return;
   }
   if (event.type === 'solve') { state.solve = event; panels.target.update?.(state); }
 }

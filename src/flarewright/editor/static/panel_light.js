@@ -1,8 +1,9 @@
 // Lights, camera, view.
 import { holdoutGroup } from './group_holdout.js';
 import { pathGroup } from './group_path.js';
+import { plateGroup } from './group_plate.js';
 import { ofLens } from './of_lens.js';
-import { button, choice, entry, group, h, refill, slider, tick } from './ui.js';
+import { button, choice, entry, group, h, refill, row, slider, tick } from './ui.js';
 
 const SPECTRA = [['d65', 'Daylight D65'], ['equal-energy', 'Equal energy'], ['black-body:3200', 'Tungsten 3200 K'], ['black-body:5600', 'Black body 5600 K'], ['black-body:2000', 'Candle 2000 K'], ['lines:589.0,589.6', 'Sodium lamp'], ['rgb:1,0.25,0.1', 'Red light'], ['rgb:0.15,0.4,1', 'Blue light']];
 const SENSORS = [['', '36 mm wide'], ['36x24', 'Full frame 36 × 24'], ['24.89x18.66', 'Super 35 4-perf'], ['23.6x15.7', 'APS-C'], ['17.3x13', 'Four Thirds'], ['54.12x25.58', 'Large format 65'], ['43.8x32.9', 'Medium 44 × 33']];
@@ -18,31 +19,48 @@ function sensorOf({ sensor_mm: own, size_px: size }) {
 }
 const fitted = (key, size) => cropped(pair(key), size).map((mm) => Number(mm.toFixed(3)));
 
+// found lights have numbers, as there may be many
+const labelOf = (light, k, state) => (/^plate-\d+$/.test(light.name) && state.plate?.lit ? String(k + 1) : light.name === 'light' ? `Light ${k + 1}` : light.name.charAt(0).toUpperCase() + light.name.slice(1));
+
 export function lightPanel(app) {
   const one = (state) => state.lights[app.light];
   const set = (values, held = '') => app.lively('set_light', { light: app.light, values }, held);
   const across = entry({ label: 'Right', tip: 'Field angle: the direct image lies focal length × tan(angle) to the right of the middle.', unit: '°', name: 'light_x', digits: 3, needed: 'needs an angle', get: (s) => one(s).field_deg[0], set: (x) => app.command('move_light', { light: app.light, x, y: one(app.state).field_deg[1] }).catch(() => {}) });
   const up = entry({ label: 'Up', tip: 'Field angle upwards. A light outside the frame has no direct image, but its ghosts may reach the frame.', unit: '°', name: 'light_y', digits: 3, needed: 'needs an angle', get: (s) => one(s).field_deg[1], set: (y) => app.command('move_light', { light: app.light, x: one(app.state).field_deg[0], y }).catch(() => {}) });
-  const choose = h('div', { class: 'buttons' });
+  const choose = h('div', { class: 'buttons lamps' });
+  const plainIntensity = slider({ label: 'Intensity', tip: 'Irradiance of the light on a plane facing it; all its ghosts scale with it.', min: 0, max: 10, step: 0.01, curve: 2, name: 'intensity', get: (s) => one(s).intensity, set: (intensity, held) => set({ intensity }, held) });
+  // lights of a plate have its unit, in which a lamp may be a million times fainter than the sun
+  const litIntensity = slider({ label: 'Intensity', tip: 'Irradiance of the light in the unit of the plate; a key of the slider changes it by a tenth of a stop.', min: 1e-8, max: 1e6, log: true, name: 'lit_intensity', get: (s) => one(s).intensity, set: (intensity, held) => set({ intensity }, held) });
+  const colour = h('input', { type: 'color', name: 'light_colour' });
+  colour.addEventListener('change', () => set({ spectrum: `rgb:${[1, 3, 5].map((k) => Number(((parseInt(colour.value.slice(k, k + 2), 16) / 255) ** 2.2).toFixed(4))).join(',')}` }));
+  const rgbOf = (s) => (one(s).spectrum.startsWith('rgb:') ? one(s).spectrum.slice(4).split(',').map(Number) : null);
+  const tint = row('Colour', 'Colour of its light.', [colour], (s) => {
+    const rgb = rgbOf(s);
+    tint.element.hidden = !rgb;
+    if (rgb) colour.value = `#${rgb.map((part) => Math.round(255 * (part / Math.max(...rgb)) ** (1 / 2.2)).toString(16).padStart(2, '0')).join('')}`;
+  });
+  const spectra = (s) => (rgbOf(s) && !SPECTRA.some(([key]) => key === one(s).spectrum) ? [...SPECTRA, [one(s).spectrum, 'Colour below']] : SPECTRA);
+  const sides = (s) => (one(s).shape?.kind === 'rectangle' ? one(s).shape : null);
+  const side = (label, k, tip) => ofLens(entry({ label, tip, unit: '°', name: `light_${label.toLowerCase()}`, needed: 'needs an angle', get: (s) => (k < 2 ? sides(s)?.size_deg[k] : sides(s)?.rotation_deg), set: (value) => { const shape = structuredClone(sides(app.state)); if (k < 2) shape.size_deg[k] = value; else shape.rotation_deg = value; set({ shape }); } }));
+  const rectangle = [side('Width', 0, 'Angular width of the rectangle.'), side('Height', 1, 'Angular height of the rectangle.'), side('Turned', 2, 'Rotation of the rectangle, counter-clockwise.')];
+  const disc = ofLens(slider({ label: 'Disc', tip: 'Angular diameter of the light: 0 is a point, 0.53° the sun. A wide light blurs every ghost.', min: 0, max: 10, step: 0.01, curve: 2, unit: '°', get: (s) => one(s).diameter_deg, set: (diameter_deg, held) => set({ diameter_deg }, held) }));
+  const formed = ofLens(choice({ label: 'Shape', name: 'light_shape', tip: 'A rectangle serves for windows, signs and tubes.', options: (s) => [['disc', 'point or disc'], ['rectangle', 'rectangle'], ...(one(s).shape?.kind === 'polygon' ? [['polygon', 'polygon']] : [])], get: (s) => one(s).shape?.kind ?? 'disc', set: (kind) => { const wide = one(app.state).diameter_deg || 1; if (kind === 'rectangle') set({ shape: { kind, size_deg: [wide, wide] }, diameter_deg: 0 }); else if (kind === 'disc') set({ shape: null, diameter_deg: sides(app.state)?.size_deg[1] ?? 0 }); } }));
   const lights = group('Lights', [
     choose, across, up,
-    slider({ label: 'Intensity', tip: 'Irradiance of the light on a plane facing it; all its ghosts scale with it.', min: 0, max: 10, step: 0.01, curve: 2, name: 'intensity', get: (s) => one(s).intensity, set: (intensity, held) => set({ intensity }, held) }),
-    choice({ label: 'Spectrum', tip: 'Spectrum of the light: coatings reflect each wavelength differently, so the spectrum colours the ghosts.', name: 'spectrum', options: SPECTRA, get: (s) => one(s).spectrum, set: (spectrum) => set({ spectrum }) }),
-    ofLens(slider({ label: 'Disc', tip: 'Angular diameter of the light: 0 is a point, 0.53° the sun. A wide light blurs every ghost.', min: 0, max: 10, step: 0.01, curve: 2, unit: '°', get: (s) => one(s).diameter_deg, set: (diameter_deg, held) => set({ diameter_deg }, held) })),
+    plainIntensity,
+    litIntensity,
+    choice({ label: 'Spectrum', tip: 'Spectrum of the light: coatings reflect each wavelength differently, so the spectrum colours the ghosts.', name: 'spectrum', options: spectra, get: (s) => one(s).spectrum, set: (spectrum) => set({ spectrum }) }),
+    tint, formed, disc, ...rectangle,
     ofLens(entry({ label: 'Distance', tip: 'Distance from the first vertex; empty: infinitely far, with parallel rays.', unit: 'mm', placeholder: 'far', name: 'distance', get: (s) => one(s).distance, set: (distance) => set({ distance }) })),
   ]);
   const path = pathGroup(app);
   const hiding = holdoutGroup(app);
   const view = (values) => app.setView(values);
-  const plate = h('span', { class: 'quietly' });
-  const picker = h('input', { type: 'file', accept: '.exr,.png,.jpg,.jpeg', hidden: true });
-  picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0]); picker.value = ''; });
+  const plate = plateGroup(app);
   const seeing = group('View', [
     ofLens(tick({ label: 'Grey', name: 'grey', tip: 'All surfaces reflect alike, regardless of coatings, so that ghosts hidden by coatings can be seen and dragged (G).', get: (s) => s.view.grey, set: (grey) => view({ grey }) })),
     ofLens(tick({ label: 'No entrance clip', name: 'unclipped', tip: 'The first surface has no rim: shows ghosts that the entrance hides at this angle (E).', get: (s) => s.view.unclipped, set: (unclipped) => view({ unclipped }) })),
     tick({ label: 'Safe frame', name: 'safe', tip: 'Lines at 90 % and 80 % of the frame (H).', get: (s) => s.view.safe_frame, set: (safe_frame) => view({ safe_frame }) }),
-    { element: h('div', { class: 'row', tip: 'A picture under the flare, to judge it in its scene; it is added as linear light before the view. No file contains it.' }, h('label', {}, 'Background'), h('div', { class: 'fields' }, button('Choose…', () => picker.click()), button('None', () => view({ plate: null })), plate, picker)), update: (s) => { plate.textContent = s.view.plate ? s.view.plate.split(/[\\/]/).pop() : ''; } },
-    slider({ label: 'Its brightness', tip: 'Brightness of the background, in stops.', min: -8, max: 8, step: 0.1, digits: 1, unit: 'stops', get: (s) => s.view.plate_stops, set: (plate_stops) => view({ plate_stops }) }),
   ]);
   const camera = (values, held = '') => app.lively('set_camera', { values }, held);
   const shot = group('Camera', [
@@ -61,13 +79,19 @@ export function lightPanel(app) {
     slider({ label: 'Starburst ×', tip: 'Factor on the direct image and its diffraction; 1 is physical.', min: 0, max: 10, step: 0.01, curve: 2, get: (s) => s.pass_gain.starburst ?? 1, set: (gain, held) => app.lively('set_pass_gain', { name: 'starburst', gain }, held) }),
   ]);
   return {
-    element: h('div', {}, lights.element, path.element, shot.element, seeing.element, hiding.element, work.element),
+    element: h('div', {}, lights.element, plate.element, path.element, shot.element, seeing.element, hiding.element, work.element),
     update(state) {
-      refill(choose, [...state.lights.map((light, k) => button(light.name === 'light' ? `Light ${k + 1}` : light.name.charAt(0).toUpperCase() + light.name.slice(1), () => { app.chooseLight(k); app.panels.light.update(app.state); app.view.redraw(); }, { kind: k === app.light ? 'on' : '', tip: 'Choose the light for the controls below, the arrow keys and drags in the picture.' })),
+      refill(choose, [...state.lights.map((light, k) => button(labelOf(light, k, state), () => { app.chooseLight(k); app.panels.light.update(app.state); app.view.redraw(); }, { kind: k === app.light ? 'on' : '', tip: 'Choose the light for the controls below, the arrow keys and drags in the picture.' })),
         button('+', () => app.command('add_light', {}).then(() => { app.chooseLight(app.state.lights.length - 1); app.view.redraw(); }).catch(() => {}), { id: 'light-add', kind: 'quiet', tip: 'Add a light.' }),
         button('Remove', () => app.command('remove_light', { light: app.light }).catch(() => {}), { kind: 'quiet', disabled: state.lights.length < 2, tip: 'Remove the chosen light; the last one cannot be removed.' })]);
-      for (const part of [lights, path, shot, seeing, hiding, work]) part.update(state);
+      plainIntensity.element.hidden = Boolean(state.plate?.lit);
+      litIntensity.element.hidden = !plainIntensity.element.hidden;
+      for (const part of [lights, plate, path, shot, seeing, hiding, work]) part.update(state);
+      disc.element.hidden ||= Boolean(one(state).shape);
+      for (const part of rectangle) part.element.hidden ||= !sides(state);
     },
+    open: (on) => plate.open(on),
+    searched: () => plate.found(false),
     moved(angles) {
       across.element.querySelector('input').value = angles[0].toFixed(2);
       up.element.querySelector('input').value = angles[1].toFixed(2);

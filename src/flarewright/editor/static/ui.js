@@ -78,11 +78,12 @@ export function row(label, tip, fields, update) {
 const KEY_STEPS = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10, Home: -Infinity, End: Infinity };
 
 // A slider with a number box. `set` receives the value and a group, so that one stroke is one step of the history;
-// `skip` maps a value reached by keys to a valid one.
-export function slider({ label, tip, get, set, min, max, step = 0.01, digits = 2, unit = '', curve = 1, name, skip = (value) => value }) {
-  const to = (value) => Math.pow(Math.max(0, (value - min) / (max - min)), 1 / curve);
-  const from = (part) => min + (max - min) * Math.pow(part, curve);
-  const bar = h('input', { type: 'range', min: 0, max: 1, step: curve === 1 ? step / (max - min) : 0.001, 'aria-label': label });
+// `skip` maps a value reached by keys to a valid one; `log`: from `min` to `max` in equal factors.
+export function slider({ label, tip, get, set, min, max, step = 0.01, digits = 2, unit = '', curve = 1, name, skip = (value) => value, log = false }) {
+  const to = (value) => (log ? Math.log(Math.max(value, min) / min) / Math.log(max / min) : Math.pow(Math.max(0, (value - min) / (max - min)), 1 / curve));
+  const from = (part) => (log ? min * (max / min) ** part : min + (max - min) * Math.pow(part, curve));
+  const written = (value) => (log && value !== null ? String(Number(value.toPrecision(3))) : shown(value, digits));
+  const bar = h('input', { type: 'range', min: 0, max: 1, step: curve === 1 && !log ? step / (max - min) : 0.001, 'aria-label': label });
   const box = h('input', { class: 'number small', type: 'text', inputmode: 'decimal', 'aria-label': label, name });
   let held = null;
   let kept = null;
@@ -93,7 +94,7 @@ export function slider({ label, tip, get, set, min, max, step = 0.01, digits = 2
     asked += 1;
     Promise.resolve(set(value, group)).finally(() => { asked -= 1; show(); });
   };
-  const rounded = (value) => Number((Math.round(value / step) * step).toFixed(6));
+  const rounded = (value) => (log ? Number(value.toPrecision(4)) : Number((Math.round(value / step) * step).toFixed(6)));
   bar.addEventListener('pointerdown', () => { held = stroke(); });
   bar.addEventListener('keydown', (event) => {
     const by = KEY_STEPS[event.key] * (event.shiftKey ? 10 : 1);
@@ -101,28 +102,29 @@ export function slider({ label, tip, get, set, min, max, step = 0.01, digits = 2
     // the browser steps the bar; with a curve that may be less than one step of the value, without effect
     event.preventDefault();
     held ??= stroke();
-    kept = skip(Math.max(min, Math.min(max, rounded((kept ?? min) + by * step))), by);
+    const next = log ? (Math.max(kept ?? min, min)) * 2 ** (by / 10) : (kept ?? min) + by * step;
+    kept = skip(Math.max(min, Math.min(max, rounded(next))), by);
     bar.value = to(kept);
-    box.value = shown(kept, digits);
+    box.value = written(kept);
     ask(kept, held);
   });
   bar.addEventListener('keyup', () => { held = null; });
   bar.addEventListener('input', () => {
     const value = rounded(from(Number(bar.value)));
-    box.value = shown(value, digits);
+    box.value = written(value);
     ask(value, held ?? '');
   });
   bar.addEventListener('change', () => { held = null; });
   box.addEventListener('change', () => {
     const value = number(box.value);
-    if (value === null) unread(box, label, shown(kept, digits)); else ask(value, '');
+    if (value === null) unread(box, label, written(kept)); else ask(value, '');
   });
-  escapes(box, () => shown(kept, digits));
+  escapes(box, () => written(kept));
   function show() {
     if (asked || !reported) return;
     kept = get(reported);
     if (!bar.matches(':active')) bar.value = to(kept ?? min);
-    if (document.activeElement !== box) box.value = shown(kept, digits);
+    if (document.activeElement !== box) box.value = written(kept);
   }
   return row(label, tip, [bar, box, h('span', { class: 'unit' }, unit)], (state) => { reported = state; show(); });
 }

@@ -6,6 +6,8 @@ import { stroke } from './ui.js';
 const FADE_MS = 160;
 const NEAR_PX = 16;
 const CLICK_PX = 4;
+// more lights have small handles
+const MANY = 4;
 const STEEPEST = 80;
 const DISTORTION_STEP = 2;
 const STEPS = [0, -21, 21, -42, 42];
@@ -116,6 +118,7 @@ export function viewport(canvas, app) {
       picture(f, now);
       border(f);
       if (app.state.view.safe_frame) safe(f);
+      outlines(f);
       overlays(f);
       paths(f);
       lights();
@@ -246,6 +249,35 @@ export function viewport(canvas, app) {
     }
     pen.lineWidth = 1;
   }
+  // what a search would find in the plate, whose centre fills the frame
+  function outlines(f) {
+    const plate = self.mover.live ? null : app.plateLights?.();
+    if (!plate) return;
+    const [wide, high] = plate.size;
+    const zoom = Math.max(f.w / wide, f.h / high);
+    pen.lineWidth = 1.3;
+    for (const one of plate.lights) {
+      const x = f.x + f.w / 2 + (one.x - wide / 2) * zoom;
+      const y = f.y + f.h / 2 + (one.y - high / 2) * zoom;
+      const [a, b] = [one.width, one.height].map((side) => Math.max(side * zoom / 2 + 2.5, 5));
+      pen.setLineDash(one.kind === 'joined' ? [3, 3] : []);
+      for (const [ink, thick] of [['#000a', 3], ['#5fe07d', 1.3]]) {
+        pen.strokeStyle = ink;
+        pen.lineWidth = thick;
+        pen.beginPath();
+        if (one.kind === 'rectangle') {
+          pen.save();
+          pen.translate(x, y);
+          pen.rotate(-one.rotation_deg * Math.PI / 180);
+          pen.rect(-a, -b, 2 * a, 2 * b);
+          pen.restore();
+        } else pen.ellipse(x, y, a, b, -one.rotation_deg * Math.PI / 180, 0, 7);
+        pen.stroke();
+      }
+    }
+    pen.setLineDash([]);
+    pen.lineWidth = 1;
+  }
   // the path of a keyed light: straight in field angles, so slightly curved in the picture
   function paths(f) {
     pen.strokeStyle = 'rgba(240,176,84,.45)';
@@ -269,6 +301,14 @@ export function viewport(canvas, app) {
       const [x, y, held] = handle(k);
       const chosen = k === app.light;
       pen.strokeStyle = '#000a'; pen.lineWidth = 3;
+      if (!chosen && app.state.lights.length > MANY) {
+        // small rings, which leave the lamps of a city visible
+        for (const [ink, thick] of [['#000a', 3], ['#ddd', 1]]) {
+          pen.strokeStyle = ink; pen.lineWidth = thick;
+          pen.beginPath(); pen.arc(x, y, 4, 0, 7); pen.stroke();
+        }
+        return;
+      }
       for (let pass = 0; pass < 2; pass++) {
         pen.beginPath(); pen.arc(x, y, 8, 0, 7);
         pen.moveTo(x - 13, y); pen.lineTo(x - 8, y); pen.moveTo(x + 8, y); pen.lineTo(x + 13, y);
@@ -508,7 +548,8 @@ export function viewport(canvas, app) {
   // -------------------------------------------------------------------------------------------------------- dragging
   // The light's handle or the chosen ghost, whichever is nearer: ghosts may lie next to the light.
   function under(px, py) {
-    const near = app.state.lights.map((_, k) => [k, ...handle(k)]).find(([, x, y]) => Math.hypot(px - x, py - y) < NEAR_PX);
+    const away = ([, x, y]) => Math.hypot(px - x, py - y);
+    const near = app.state.lights.map((_, k) => [k, ...handle(k)]).filter((one) => away(one) < NEAR_PX).sort((one, other) => away(one) - away(other))[0];
     const taken = grab(px, py);
     return near && !(taken && taken.away < Math.hypot(px - near[1], py - near[2])) ? { near, taken: null } : { near: null, taken };
   }

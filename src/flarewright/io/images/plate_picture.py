@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import prod
 from pathlib import Path
@@ -173,13 +173,25 @@ def _rate(stated: Any) -> Fraction | None:
 
 
 def _screen(path: Path, transfer: Transfer | None) -> PlatePicture:
-    from PIL import Image
+    from PIL import Image, ImageOps
 
     with outside(path, "a plate", pixel_bytes=16, remedy="give PNG, JPEG or EXR") as file, Image.open(file) as image:
-        deep = image.mode.startswith("I") or (image.format == "PNG" and _depth(image) > 8)
-        coded = np.asarray(image.convert("RGB"), dtype=np.float32) / np.float32(255.0)
+        if image.mode.startswith("I"):
+            # 16-bit grey, which Pillow would convert to white
+            grey = np.asarray(image, dtype=np.float32) / np.float32(65535.0)
+            return _decoded(np.repeat(grey[..., None], 3, axis=2), transfer, ())
+        deep = image.format == "PNG" and _depth(image) > 8
+        # viewers apply the camera's orientation tag
+        upright = ImageOps.exif_transpose(image)
+        alpha = None
+        if upright.has_transparency_data:
+            upright = upright.convert("RGBA")
+            alpha = np.asarray(upright.getchannel("A"), dtype=np.float32)[..., None] / np.float32(255.0)
+        coded = np.asarray(upright.convert("RGB"), dtype=np.float32) / np.float32(255.0)
     remarks = ("the plate has 16 bits, of which a PNG's first 8 are read; give TIFF or EXR for all",) if deep else ()
-    return _decoded(coded, transfer, remarks)
+    found = _decoded(coded, transfer, remarks)
+    # transparent pixels have no light, whatever colour they store
+    return found if alpha is None else replace(found, pixels=found.pixels * alpha)
 
 
 def _depth(image: Any) -> int:

@@ -34,6 +34,7 @@ from ...model.project import design as designs
 from ...model.project import light as lights
 from ...model.project import project as choices
 from ...model.project import starburst as starbursts
+from ...model.project.backplate import Backplate, PlateSearch
 from ...model.project.camera import Camera
 from ...model.project.holdout import Holdout
 from ...model.project.project import Output, Project, Quality
@@ -291,6 +292,8 @@ _SECTIONS: Sections = {
     "starburst": (starbursts.Starburst,),
     "scatter": (scatters.Scatter,),
     "holdout": (Holdout,),
+    "plate": (Backplate,),
+    "search": (PlateSearch,),
     "art": (arts.Art,),
     "rules": (arts.Rule,),
     "lens": (Lens,),

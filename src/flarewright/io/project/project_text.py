@@ -16,7 +16,7 @@ from ..lens.coating_text import UNCOATED, format_coating
 from .spectrum_text import spectrum_text
 
 HOLDOUT_FILES = ("image", "depth")
-FILES = (("iris", "mask"), ("dirt", "image"), ("holdout", *HOLDOUT_FILES))
+FILES = (("iris", "mask"), ("dirt", "image"), ("holdout", *HOLDOUT_FILES), ("plate", "image"))
 """Sections, and their keys that hold paths."""
 
 _COMMENTED_SECTIONS = ("camera", "quality", "output")
@@ -114,6 +114,13 @@ _COMMENTED_HOLDOUT = """
 # overscan = 1.2   # size of the image relative to the picture
 """
 
+_COMMENTED_PLATE = """
+# A photograph under the flare, for the editor and for comps; docs/editor.md. A render draws the flare alone.
+# [plate]
+# image = "street.jpg"
+# lights_above = 0.9   # pixels above this are the lights of this project, which have the plate's unit
+"""
+
 _COMMENTED_ART = """
 # Art direction on top of the physics; docs/art-direction.md. art.physical = true ignores it.
 # [art.gain]
@@ -156,6 +163,8 @@ def project_text(project: Project, *, folder: Path | None = None, comments: bool
     out: list[str] = []
     _emit_table(out, data, (), unset_keys, ABOUT if comments else {})
     commented = _COMMENTED_MOTION if comments and not {"curves", "timeline"} & data.keys() else ""
+    if comments and project.plate is None:
+        commented = _COMMENTED_PLATE + commented
     if comments and project.art == Art():
         commented = _COMMENTED_ART + commented
     if comments and project.holdout is None:
@@ -210,6 +219,10 @@ def project_data(project: Project, folder: Path | None = None) -> dict[str, Any]
             del written["curves"]
     if not project.curves:
         del data["curves"]
+    if project.plate is not None:
+        own = _without_none(project.plate.model_dump(mode="json", exclude_defaults=True))
+        # the path is relative by now
+        data["plate"] = own | {"image": data["plate"]["image"]}
     if project.timeline == Timeline():
         del data["timeline"]
     return data

@@ -4,6 +4,7 @@
 
 - `animation`: `Curve`, a value over time, and `Timeline`, the frames of a shot
 - `art`: `Art` and its `Rule`, art direction
+- `backplate`: `Backplate`, a photograph under the flare, and `PlateSearch`, how its lights were found
 - `camera`: `Camera`, sensor and picture size
 - `dataset`: `DatasetSpec`, the distributions of training pairs
 - `distribution`: `Distribution` of numbers and `Texts`, choices of texts

@@ -15,6 +15,7 @@ from ..lens.prescription import LARGEST_F_NUMBER, LEAST_F_NUMBER, Lens
 from ..lens.scatter import Scatter
 from .animation import ProjectCurve, Timeline, one_curve_each
 from .art import Art
+from .backplate import Backplate
 from .camera import Camera, Colorspace
 from .design import Design
 from .holdout import Holdout
@@ -200,6 +201,8 @@ class Project(Frozen):
         Values over time, for a shot; a render without a time ignores them.
     timeline : Timeline
         Frames per second of a shot, and the number of its frame at 0 s.
+    plate : Backplate or None
+        Photograph under the flare, for the editor and for comps; a render draws the flare alone.
     """
 
     schema_version: Literal[1] = 1
@@ -222,6 +225,7 @@ class Project(Frozen):
     design: Design | None = None
     curves: tuple[ProjectCurve, ...] = ()
     timeline: Timeline = Timeline()
+    plate: Backplate | None = None
 
     @field_validator("coating", mode="before")
     @classmethod

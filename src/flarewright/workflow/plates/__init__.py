@@ -2,5 +2,6 @@
 
 - `plate_files`: `plate_picture` and `plate_frames`, the pictures of a sequence or a film
 - `plate_sources`: `plate_shot` finds and follows the lights of a plate; `PlateShot`
+- `found_lights`: the lights of a single plate as lights of a project, and what keeps them in place
 - `plate_frame`: `with_plate_lights`, a frame's project over a plate; `write_comp`
 """

@@ -15,6 +15,7 @@ from ...plates.comp import composed, source_mask
 from ...plates.field_map import FieldMap, field_map
 from ...plates.lights import lights_at, plate_factor
 from ...plates.measured_plate import converted, measured_pixels
+from ...render.scene.pixel_place import DirectImages, direct_images
 from ...render.scene.resolve import resolve_project
 from .plate_files import plate_matte, plate_picture
 from .plate_sources import PlateShot
@@ -24,6 +25,9 @@ __all__ = [
     "check_comp",
     "check_plate",
     "comp_attributes",
+    "plate_images",
+    "plate_optics",
+    "same_optics",
     "with_plate_lights",
     "write_comp",
 ]
@@ -56,7 +60,7 @@ def with_plate_lights(project: Project, plate: PlateShot, frame: float) -> tuple
     ProjectError
         The project is a measured flare, whose lens is unknown.
     """
-    directions, factor = _optics(project)
+    directions, factor = plate_optics(project)
     lights, lost = lights_at(plate.lights, frame, directions, factor, project.camera.size_px)
     own = tuple(light for light in project.lights if light.intensity > 0.0)
     if own:
@@ -65,27 +69,59 @@ def with_plate_lights(project: Project, plate: PlateShot, frame: float) -> tuple
     return found, lost
 
 
-def _optics(project: Project) -> tuple[FieldMap, float]:
-    """Return the directions of the picture's places, and the plate's factor; both once for the same lens."""
+def plate_optics(project: Project) -> tuple[FieldMap, float]:
+    """Return the directions of the picture's places, and the plate's factor; both once for the same lens.
+
+    Parameters
+    ----------
+    project : Project
+        Its lights, dirt and art do not matter.
+
+    Returns
+    -------
+    directions : FieldMap
+    factor : float
+        `plates.lights.plate_factor`.
+
+    Raises
+    ------
+    ProjectError
+        The project is a measured flare, whose lens is unknown.
+    """
+    return _optics_of(_bare_text(project))[:2]
+
+
+def plate_images(project: Project) -> DirectImages:
+    """Return the direct images of the project's lens, which trace a light to its place; errors as `plate_optics`."""
+    return _optics_of(_bare_text(project))[2]
+
+
+def same_optics(one: Project, other: Project) -> bool:
+    """Return whether the lenses of two projects image a plate alike, with the same brightness."""
+    return _bare_text(one) == _bare_text(other)
+
+
+def _bare_text(project: Project) -> str:
+    """Return what bends and dims the direct image, as a key of its traced places."""
     if is_measured(project):
         raise ProjectError(
             f"{project.lens} is a measured flare, whose lens is unknown, so places in a plate have no angles; give a "
             "lens"
         )
-    # what neither bends nor dims the direct image
     bare = project.replace(
         lights=(Light(field_deg=(0.0, 0.0)),), holdout=None, art=Art(), dirt=Dirt(), starburst=Starburst(),
-        output=Output(), design=None, curves=(),
+        output=Output(), design=None, curves=(), plate=None,
         quality=Quality(mode="final", wavelengths=project.quality.wavelengths),
     )  # fmt: skip
-    return _optics_of(bare.model_dump_json())
+    return str(bare.model_dump_json())
 
 
 @lru_cache(maxsize=64)
-def _optics_of(text: str) -> tuple[FieldMap, float]:
+def _optics_of(text: str) -> tuple[FieldMap, float, DirectImages]:
     settled = resolve_project(Project.model_validate_json(text))
     directions = field_map(settled)
-    return directions, plate_factor(settled, directions)
+    images = direct_images(settled, Light(field_deg=(0.0, 0.0)))
+    return directions, plate_factor(settled, directions), images
 
 
 def alike_lights(projects: Sequence[Project]) -> list[Project]:

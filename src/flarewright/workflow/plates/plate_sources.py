@@ -64,6 +64,8 @@ class PlateShot:
     found : tuple of int
         Number of sources in each frame.
     remarks : tuple of str
+    clipped : bool
+        Whether the plate clips a source: it is brighter than the plate shows.
     """
 
     settings: PlateSettings
@@ -74,6 +76,7 @@ class PlateShot:
     lights: PlateTracks
     found: tuple[int, ...]
     remarks: tuple[str, ...]
+    clipped: bool = False
 
 
 @dataclass(frozen=True)
@@ -215,7 +218,7 @@ def plate_shot(
     )  # fmt: skip
     return PlateShot(
         settings, threshold, first.size_px, first.pixel_aspect, first.fps, lights, tuple(len(each) for each in found),
-        (*first.remarks, *remarks),
+        (*first.remarks, *remarks), clips_at is not None and bool((tracks.peak >= clips_at).any()),
     )  # fmt: skip
 
 

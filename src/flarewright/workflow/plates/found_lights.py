@@ -1,0 +1,260 @@
+"""The lights of a single plate as lights of a project, and what keeps them on the plate when the lens changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from ...errors import ProjectError
+from ...io.files.sentences import count, validation_sentences
+from ...jobs.frame_list import FramePattern
+from ...model import Backplate, Light, LightCurve, LightKey, Project
+from ...model.project.backplate import found_in_plate
+from ...model.project.light import LEAST_LIGHT_DEG, Polygon, Rectangle
+from ...plates.lights import lights_at
+from ...plates.marked import light_rows
+from ...plates.settings import PlateSettings, parse_source
+from ...render.scene.pixel_place import field_angles_at, image_px
+from ...typing import Progress
+from .plate_frame import check_plate, plate_images, plate_optics, same_optics
+from .plate_sources import PlateShot, plate_picture, plate_shot
+
+__all__ = ["FoundLights", "kept_on_plate", "plate_settings_of", "search_plate", "with_found_lights"]
+
+# frame of a single plate
+_FRAME = 1
+# largest disc and rectangle after a change of the lens, degrees
+_WIDEST_DISC_DEG, _WIDEST_DEG = 60.0, 110.0
+
+
+@dataclass(frozen=True)
+class FoundLights:
+    """The sources that a search has found in a plate.
+
+    Attributes
+    ----------
+    plate : Backplate
+        As searched; `lights_above` is the threshold.
+    shot : PlateShot
+    """
+
+    plate: Backplate
+    shot: PlateShot
+
+    @property
+    def rows(self) -> list[dict[str, float | int | str]]:
+        """The sources in pixels of the plate, the brightest first (`plates.marked.light_rows`)."""
+        return light_rows(self.shot.lights, _FRAME)
+
+
+def plate_settings_of(plate: Backplate) -> PlateSettings:
+    """Return the settings with which `shot` and `sources` search a plate.
+
+    Raises
+    ------
+    ProjectError
+        They contradict each other, or the file's name stands for a sequence.
+    """
+    if FramePattern(plate.image).numbered:
+        raise ProjectError(f"{plate.image} stands for a sequence; give the file of one frame")
+    search = plate.search
+    return PlateSettings(
+        plate.image, layer=plate.layer, transfer=plate.transfer, threshold=search.threshold, stops=search.stops,
+        least_px=search.least_px, most_lights=search.most_lights, point_px=search.point_px, gain=search.gain,
+        highlights=search.highlights, white=search.white,
+        source=None if search.source is None else parse_source(search.source),
+    )  # fmt: skip
+
+
+def search_plate(plate: Backplate, progress: Progress | None = None) -> FoundLights:
+    """Find the lights of a plate.
+
+    Parameters
+    ----------
+    plate : Backplate
+    progress : callable, optional
+        Called with the finished part of the work and what is done; an exception that it raises ends the search.
+
+    Returns
+    -------
+    FoundLights
+
+    Raises
+    ------
+    FlarewrightError
+        The plate cannot be read, or has no light above the threshold.
+    """
+    report: Progress = progress or (lambda *_: None)
+    settings = plate_settings_of(plate)
+    report(0.0, "reading the plate")
+    plate_picture(settings, _FRAME)
+    report(0.4, "finding lights")
+    shot = plate_shot(settings, (_FRAME,))
+    report(1.0, "finding lights")
+    return FoundLights(plate.replace(lights_above=shot.threshold), shot)
+
+
+def with_found_lights(project: Project, found: FoundLights) -> tuple[Project, tuple[str, ...]]:
+    """Return a project whose lights are those of a plate, in the plate's unit.
+
+    Parameters
+    ----------
+    project : Project
+        A picture of another shape becomes one of the plate's size, on the same width of the sensor. If its lights are
+        those of a plate already, found ones are replaced and others stay; else all are replaced, for theirs is another
+        unit.
+    found : FoundLights
+
+    Returns
+    -------
+    project : Project
+    remarks : tuple of str
+
+    Raises
+    ------
+    FlarewrightError
+        The project is a measured flare, or its lens images too little of the picture.
+    """
+    framed = _framed(project, found.shot)
+    directions, factor = plate_optics(framed)
+    try:
+        lights, lost = lights_at(found.shot.lights, _FRAME, directions, factor, framed.camera.size_px)
+    except ValidationError as error:
+        raise ProjectError("; ".join(validation_sentences(error))) from None
+    if not any(light.intensity > 0.0 for light in lights):
+        raise ProjectError("the lens images none of the found lights; choose a longer lens, or a smaller sensor")
+    lit = project.plate is not None and project.plate.lit
+    own = tuple(light for light in project.lights if lit and not found_in_plate(light))
+    remarks = [f"{count(len(lights), 'light was', 'lights were')} found", *found.shot.remarks]
+    if found.shot.clipped and not found.plate.search.brightened:
+        remarks.append("the plate clips them, so they are brighter than it shows: --plate-gain or --highlights says so")
+    if lost > 0.0:
+        remarks.append(f"{lost:.2%} of the plate's light lies where the lens images nothing, and is left out")
+    if framed.camera != project.camera:
+        remarks.append(f"the picture has the size of the plate now, {'x'.join(map(str, framed.camera.size_px))}")
+    # the brightest first, as a person looks at them
+    ordered = sorted(lights, key=lambda light: -light.intensity)
+    changed: Project = framed.replace(lights=(*ordered, *own), plate=found.plate)
+    return changed, tuple(remarks)
+
+
+def _framed(project: Project, shot: PlateShot) -> Project:
+    """Return the project with a picture of the plate's shape."""
+    try:
+        check_plate(project, shot.size_px)
+    except ProjectError:
+        camera = project.camera
+        width, height = shot.size_px
+        if camera.sensor_mm is not None:
+            # the same pixels' shape on the same width
+            across, down = camera.sensor_mm
+            tall = down / across * camera.size_px[0] / camera.size_px[1]
+            camera = camera.replace(sensor_mm=(across, across * tall * height / width))
+        changed: Project = project.replace(camera=camera.replace(size_px=shot.size_px))
+        return changed
+    return project
+
+
+def kept_on_plate(before: Project, after: Project) -> Project:
+    """Return a changed project whose lights lie where they lay in the plate, with the same light in its unit.
+
+    Another f-number, lens, zoom or sensor changes both the angle of a pixel and the irradiance that its value stands
+    for. Without this, stopping down would dim the flare, but not the plate.
+
+    Parameters
+    ----------
+    before, after : Project
+        Before and after a change. Projects without a plate's lights, or whose lens is the same, are returned as they
+        are.
+
+    Returns
+    -------
+    Project
+
+    Raises
+    ------
+    ProjectError
+        The picture has no longer the shape of the plate.
+
+    Notes
+    -----
+    A light of irradiance E at a place with the solid angle omega of a part of the picture gets E' = E (omega' f') /
+    (omega f), with the factors f of `plates.lights.plate_factor`.
+    """
+    lit = all(project.plate is not None and project.plate.lit for project in (before, after))
+    if not lit or len(before.lights) != len(after.lights) or same_optics(before, after):
+        return after
+    check_plate(after, before.camera.size_px)
+    moved = _Moved(before, after)
+    lights = tuple(moved.light(old, new) for old, new in zip(before.lights, after.lights, strict=True))
+    found: Project = after.replace(lights=lights)
+    return found
+
+
+class _Moved:
+    """Places and brightnesses of the lights of a plate, from one lens to another."""
+
+    def __init__(self, before: Project, after: Project) -> None:
+        self.before, self.after = plate_images(before), plate_images(after)
+        self.optics = plate_optics(before), plate_optics(after)
+        self.sizes = np.array(before.camera.size_px, float), np.array(after.camera.size_px, float)
+
+    def light(self, old: Light, new: Light) -> Light:
+        """Return a light of the changed project, at its place in the plate."""
+        field, ratio = self.angles(old.field_deg)
+        scale = ratio[0] ** 0.5
+        changes: dict[str, Any] = {
+            "field_deg": field,
+            "intensity": old.intensity * ratio[1],
+            "diameter_deg": _angle(old.diameter_deg * scale, _WIDEST_DISC_DEG),
+            "shape": _scaled(old.shape, scale),
+            "keyframes": tuple(LightKey(at_s=k.at_s, field_deg=self.angles(k.field_deg)[0]) for k in old.keyframes),
+            "curves": tuple(_brighter(curve, ratio[1]) for curve in old.curves),
+        }
+        found: Light = new.replace(**changes)
+        return found
+
+    def angles(self, field_deg: tuple[float, float]) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return new field angles, and the ratios of the solid angle and of the irradiance."""
+        place = image_px(self.before, field_deg)
+        (directions, factor), (new_directions, new_factor) = self.optics
+        if place is None:
+            # beside what the lens images: its angle stays, and what the axis says of the brightness
+            return field_deg, (1.0, new_factor / factor)
+        at = np.array([place])
+        new_at = at * self.sizes[1] / self.sizes[0]
+        omega = float(directions.solid_angles(at)[0] * self.sizes[0].prod())
+        new_omega = float(new_directions.solid_angles(new_at)[0] * self.sizes[1].prod())
+        ratio = new_omega / omega if np.isfinite(new_omega) and np.isfinite(omega) and omega > 0.0 else 1.0
+        try:
+            x, y = field_angles_at(self.after, (float(new_at[0, 0]), float(new_at[0, 1])))
+        except ProjectError:
+            x, y = field_deg
+        return (x, y), (ratio, ratio * new_factor / factor)
+
+
+def _angle(angle_deg: float, widest_deg: float) -> float:
+    return 0.0 if angle_deg < LEAST_LIGHT_DEG else min(angle_deg, widest_deg)
+
+
+def _brighter(curve: LightCurve, ratio: float) -> LightCurve:
+    """Return a curve of a light whose irradiance is multiplied by a ratio."""
+    if curve.of != "intensity":
+        return curve
+    values = np.array(curve.values, dtype=np.float64) * ratio
+    found: LightCurve = curve.replace(values=tuple(values.tolist()))
+    return found
+
+
+def _scaled(shape: Rectangle | Polygon | None, scale: float) -> Rectangle | Polygon | None:
+    """Return the shape of an area light, larger or smaller."""
+    found: Rectangle | Polygon | None = None
+    if isinstance(shape, Rectangle):
+        width, height = (min(max(side * scale, LEAST_LIGHT_DEG), _WIDEST_DEG) for side in shape.size_deg)
+        found = shape.replace(size_deg=(width, height))
+    elif isinstance(shape, Polygon):
+        found = shape.replace(corners_deg=tuple((x * scale, y * scale) for x, y in shape.corners_deg))
+    return found
