@@ -204,7 +204,7 @@ def test_the_editor_works_behind_a_proxy_with_a_path(chrome, tmp_path, flavour):
             tab.until("document.querySelector('.library img')?.naturalWidth > 0")
             # larger than a proxy lets through by default
             drop(tab, "sky.png", png(np.random.default_rng(1).integers(0, 256, (800, 800, 3), dtype=np.uint8)))
-            tab.until("flarewright.state.view.plate")
+            tab.until("flarewright.state.plate")
             assert tab.said == []
             assert all(url.startswith((base, "blob:", "data:")) for url in tab.asked)
             # the cookie is not sent to other users of the proxy

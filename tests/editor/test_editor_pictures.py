@@ -17,7 +17,7 @@ from flarewright.editor.commands.shot import move_light
 from flarewright.editor.preview import draft_calibration as calibration_module
 from flarewright.editor.preview import draft_match, render_picture
 from flarewright.editor.preview.diagrams import cross_section_diagram
-from flarewright.editor.preview.display_image import FALSE_COLOURS, jpeg, pixels_of, plate_for
+from flarewright.editor.preview.display_image import FALSE_COLOURS, jpeg, pixels_of
 from flarewright.editor.preview.draft_calibration import levels_at, measured, missing, with_node
 from flarewright.editor.preview.drag import FAST_S, SCALES, SLOW_S, Drag
 from flarewright.editor.preview.ghost_picking import (
@@ -29,6 +29,7 @@ from flarewright.editor.preview.ghost_picking import (
     single_ghost,
     under,
 )
+from flarewright.editor.preview.plate_view import plate_for
 from flarewright.editor.preview.progressive_render import sharpen
 from flarewright.editor.preview.queries import outline_png, picked, target_jpeg
 from flarewright.editor.preview.viewport import Screen, packed_pixels, pixels_of_picture, shown_pixels
@@ -38,7 +39,7 @@ from flarewright.editor.session.image_files import in_short
 from flarewright.editor.session.session import begin
 from flarewright.editor.session.view_settings import View
 from flarewright.errors import ProjectError
-from flarewright.model import Camera, Everywhere, Holdout, Iris, Light, Output, Quality, QuarterWave
+from flarewright.model import Backplate, Camera, Everywhere, Holdout, Iris, Light, Output, Quality, QuarterWave
 from flarewright.optics.colour.rgb import luminance_weights
 from flarewright.render.preview.diagnostic_views import GREY_R, working_ghosts
 from flarewright.render.render import render
@@ -322,7 +323,7 @@ def test_backgrounds_of_all_kinds(tmp_path):
     from PIL import Image
 
     def plate(path, size=(8, 4)):
-        return plate_for(View(plate=str(path)), size)
+        return plate_for(Backplate(image=str(path)), size).pixels
 
     # 16-bit grey does not become white
     Image.fromarray(np.full((4, 8), 0x8000, np.uint16)).save(tmp_path / "deep.png")
@@ -371,7 +372,7 @@ def test_backgrounds_of_all_kinds(tmp_path):
     found = plate(exr("part.exr", dict.fromkeys("RGB", half), ((0, 0), (15, 3))), (16, 4))
     assert found[:, :7].min() == 1.0
     assert found[:, 9:].max() == 0.0
-    with pytest.raises(ProjectError, match=r"two\.exr cannot be read as a background .*channels are depth, mask"):
+    with pytest.raises(ProjectError, match=r"two\.exr cannot be read as a plate .*channels are depth, mask"):
         plate(exr("two.exr", {"depth": grey, "mask": grey}))
 
 
@@ -387,17 +388,17 @@ def test_looks_and_background(tmp_path):
     assert tuple(pixels_of(light, 20.0, View(look="false-colour"))[0, 0]) == FALSE_COLOURS[-1][1]
     path = tmp_path / "plate.png"
     Image.new("RGB", (30, 20), (188, 0, 0)).save(path)
-    look = View(look="srgb", plate=str(path), plate_stops=-1.0)
-    plate = plate_for(look, (8, 8))
+    look = View(look="srgb", plate_stops=-1.0)
+    plate = plate_for(Backplate(image=str(path)), (8, 8)).pixels
     shown = pixels_of(np.zeros((8, 8, 3), np.float32), 5.0, look, plate)
     # half of the linear 0.503 is shown as 137
     assert abs(int(shown[4, 4, 0]) - 137) <= 1
     assert shown[..., 1:].max() == 0
     path.write_text("cannot be read as a picture")
-    with pytest.raises(ProjectError, match="cannot be read as a picture"):
-        plate_for(look, (9, 8))
+    with pytest.raises(ProjectError, match=r"plate\.png cannot be read as a plate"):
+        plate_for(Backplate(image=str(path)), (9, 8))
     with pytest.raises(ProjectError, match="is gone"):
-        plate_for(View(plate=str(tmp_path / "none.png")), (8, 8))
+        plate_for(Backplate(image=str(tmp_path / "none.png")), (8, 8))
     assert jpeg(shown)[:2] == b"\xff\xd8"
 
 

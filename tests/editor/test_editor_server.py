@@ -95,7 +95,9 @@ def test_the_page_and_every_question_it_asks(workspace):
     # after the drag has ended, requests for its target are empty
     assert ask(workspace, "/api/target?at=0&revision=-1") == (204, b"")
     spoken = {path.split("?")[0] for path in asked} | {"/api/state", "/api/pick", "/api/places", "/api/glasses"}
-    spoken |= {"/api/library", "/api/ghosts", "/api/command", "/api/section", "/api/mask"}
+    code, answer = reported(workspace, "/api/plate/lights")
+    assert (code, "there is no plate" in answer["error"]) == (400, True)
+    spoken |= {"/api/plate/lights", "/api/library", "/api/ghosts", "/api/command", "/api/section", "/api/mask"}
     assert reported(workspace, "/api/mask") == (400, {"error": "the iris has no mask; load or draw one"})
     missing = {path for path in _GET if "{" not in path} - spoken
     assert not missing
@@ -153,10 +155,12 @@ def test_import_export_and_the_command(workspace, tmp_path):
 
 
 def test_a_missing_background_is_reported(workspace, tmp_path):
-    reported(workspace, "/api/view", {"plate": str(tmp_path / "gone.png")})
+    set_plate = {"name": "set_plate", "values": {"values": {"image": str(tmp_path / "gone.png")}}}
+    assert reported(workspace, "/api/do", set_plate)[0] == 200
     code, answer = reported(workspace, "/api/picture")
-    assert (code, "is gone" in answer["error"]) == (400, True)
-    reported(workspace, "/api/view", {"plate": None})
+    assert code == 400
+    assert answer["error"].startswith("the plate gone.png does not exist in ")
+    reported(workspace, "/api/do", {"name": "remove_plate"})
     assert ask(workspace, "/api/picture")[0] == 200
 
 

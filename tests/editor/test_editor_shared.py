@@ -89,7 +89,7 @@ def test_pictures_are_taken_for_what_they_were_chosen_for(tmp_path):
     take_in(session, "leaves.png", grey, "image", 0)
     assert session.project.lights[0].holdout.image.endswith("leaves.png")
     take_in(session, "sky.png", grey)
-    assert session.view.plate.endswith("sky.png")
+    assert session.project.plate.image.endswith("sky.png")
     before = session.project
     for name, data, use in (
         ("lens.toml", b"schema_version = 1\n", "mask"), ("dark.png", png(np.zeros((8, 8, 3), np.uint8)), "mask"),

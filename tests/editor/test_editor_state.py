@@ -422,7 +422,8 @@ def test_every_command_is_tried_here():
         "move_light set_light add_light remove_light set_camera set_quality set_fields set_iris set_dirt set_starburst "
         "set_pass_gain set_coating put_look set_row_wavelengths set_cell add_row duplicate_row remove_row move_stop "
         "choose_lens set_lens_facts set_ghost set_solo reset_art set_ghost_target add_ghost remove_ghost_target "
-        "set_new_ghost_target set_design clear_ghost_targets set_key move_key remove_key clear_keys go_to set_holdout"
+        "set_new_ghost_target set_design clear_ghost_targets set_key move_key remove_key clear_keys go_to set_holdout "
+        "set_plate remove_plate"
     )
     assert sorted(tried.split()) == sorted(COMMANDS)
 

@@ -45,7 +45,8 @@ def test_the_page_reads_and_writes_under_the_folders_only(session, tmp_path):
     session.do("choose_lens", {"lens": "heliar-tronnier"})
     session.do("choose_lens", {"lens": str(inside / "lens.toml")})
     session.do("set_iris", {"values": {"mask": str(inside / "grey.png")}})
-    session.set_view({"plate": str(inside / "grey.png")})
+    session.do("set_plate", {"values": {"image": str(inside / "grey.png")}})
+    session.open(str(inside / "grey.png"))
     assert session.save(str(inside / "shot.toml")).is_file()
     before, view = session.project, session.view
     (inside / "link.toml").symlink_to(outside / "lens.toml")
@@ -65,7 +66,8 @@ def test_the_page_reads_and_writes_under_the_folders_only(session, tmp_path):
         lambda: session.do("set_dirt", {"values": {"image": out}}),
         lambda: session.do("set_holdout", {"light": None, "values": {"depth": out}}),
         lambda: session.do("set_holdout", {"light": 0, "values": {"image": out}}),
-        lambda: session.set_view({"plate": out}),
+        lambda: session.do("set_plate", {"values": {"image": out}}),
+        lambda: session.open(out),
     ):
         with pytest.raises(ProjectError, match=OUTSIDE):
             asked()
@@ -111,7 +113,7 @@ def test_a_project_may_not_lead_out_of_the_folders(session, tmp_path):
     assert session.project == before
     # a dropped picture is kept in the state folder, which the page does use
     take_in(session, "sky.png", (outside / "secret.png").read_bytes())
-    assert session.view.plate is not None
+    assert session.project.plate is not None
 
 
 def test_what_was_opened_at_the_start_stays_within_reach(tmp_path, project):

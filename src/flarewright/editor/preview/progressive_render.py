@@ -7,6 +7,8 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ...model import Project
 from ..common.latest_job import Check
 from ..session.view_settings import View
@@ -47,6 +49,7 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
     check : callable
         Raises when a newer job waits.
     """
+    _brighten(screen, project, view)
     shown = screen.picture
     if shown is not None and _is_up_to_date(screen, shown, project, view):
         _enlarge(screen, shown, view, check)
@@ -54,6 +57,29 @@ def sharpen(screen: Screen, project: Project, view: View, check: Check) -> None:
         _calibrate(screen, project, check)
     else:
         _sharpen(screen, shown, project, view, check)
+
+
+def _brighten(screen: Screen, project: Project, view: View) -> None:
+    """Multiply a final picture whose lights have all become brighter alike, as by a slider, instead of drawing it."""
+    shown, seen = screen.picture, screen.seen
+    if shown is None or seen is None or shown.grade != "final" or view.grey or view.unclipped:
+        return
+    now = render_picture.pictured(project)
+    gain = None if render_picture.pictured(shown.project) == now else render_picture.common_gain(shown.project, project)
+    if gain is None or render_picture.pictured(seen.project) != render_picture.pictured(shown.project):
+        return
+    factor = np.float32(gain)
+    haze = None if shown.haze is None else shown.haze * factor
+    ghosts = tuple(
+        replace(ghost, flux=ghost.flux * gain, peak=ghost.peak * gain, light=ghost.light * factor)
+        for ghost in seen.ghosts
+    )
+    screen.seen = replace(seen, project=project, ghosts=ghosts)
+    screen.show(replace(shown, project=project, ghosts=shown.ghosts * factor, rest=shown.rest * factor, haze=haze))
+    if screen.match.lights == shown.project.lights:
+        # the gains of drafts hold for any brightness
+        screen.match = replace(screen.match, lights=project.lights)
+    screen.session.tell({"type": "ghosts"})
 
 
 def _sharpen(screen: Screen, shown: DrawnPicture | None, project: Project, view: View, check: Check) -> None:

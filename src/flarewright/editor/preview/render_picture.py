@@ -191,6 +191,30 @@ def moving_stage(project: Project, scale: float, levels: Levels) -> Project:
     return found
 
 
+def common_gain(shown: Project, project: Project) -> float | None:
+    """Return the factor by which all lights of a project are brighter than in a shown one; None if more differs.
+
+    Parameters
+    ----------
+    shown, project : Project
+
+    Returns
+    -------
+    float or None
+    """
+    if len(shown.lights) != len(project.lights) or not shown.lights[0].intensity > 0.0:
+        return None
+    gain = project.lights[0].intensity / shown.lights[0].intensity
+    if not gain > 0.0:
+        return None
+    for one, other in zip(shown.lights, project.lights, strict=True):
+        # products of rounded numbers
+        alike = abs(one.intensity * gain - other.intensity) <= 1e-9 * other.intensity
+        if not alike or one.replace(intensity=other.intensity) != other:
+            return None
+    return gain if pictured(shown.replace(lights=project.lights)) == pictured(project) else None
+
+
 def spread_layers(layers: Sequence[Layer], size_px: tuple[int, int]) -> Pixels:
     """Add layers into one image of the picture's size."""
     sheet = np.zeros((size_px[1], size_px[0], 3), dtype=np.float32)
