@@ -113,10 +113,11 @@ def shot(
         compiles kernels here.
     plate : PlateSettings, optional
         A picture, one a frame, or a film (its first frame is that at 0 s), whose bright sources are lights, in
-        addition to those of the project (of which dark ones are left out). The layers then have the unit of the plate.
-        `frames` of None: all frames of the plate.
+        addition to those of the project. Dark ones are left out, and those that the editor has found in the project's
+        plate. The layers then have the unit of the plate. `frames` of None: all frames of the plate.
     over : path, optional
-        Also write the plate with its flare, one EXR file a frame, named as `output`.
+        Also write the plate with its flare, one EXR file a frame, named as `output`. Without `plate` that of the
+        project, whose lights must have been found in it.
     searched : callable, optional
         Called after the search for sources in each plate with the frame, the number of searched frames and that of all.
     movie : path, optional
@@ -150,11 +151,15 @@ def shot(
     _check(shutter_deg, subframes)
     if plate is not None:
         plate = replace(plate, first=project.timeline.start)
+        from .plates.found_lights import without_found_lights
+
+        # the lights of each frame replace those that the editor has found in one
+        project = without_found_lights(project)
     pattern = FramePattern(os.fspath(output))
     numbers, remarks = shot_frames(project, frames, plate)
     pattern.check(numbers)
     _check_output(pattern)
-    comp = _comp_pattern(over, plate, numbers)
+    comp = _comp_pattern(over, plate, project, numbers)
     if movie is not None:
         _check_movie(movie, FramePattern(comp or pattern.text), chunk)
     written = [pattern.text, comp, "" if movie is None else os.fspath(movie)]
@@ -162,7 +167,11 @@ def shot(
     mine = numbers if chunk is None else chunk_of(numbers, *parse_chunk(chunk))
     if shutter_deg == 0.0 and subframes is not None and subframes > 1:
         remarks.append("sub-frames have no effect without an open shutter: give its angle, such as 180 degrees")
-    found = None if plate is None else _searched(project, plate, numbers, pattern, comp, processes, threads, searched)
+    found = None
+    if plate is not None:
+        found = _searched(project, plate, numbers, pattern, comp, processes, threads, searched)
+    elif comp:
+        found = _own_plate(project)
     if found is not None:
         remarks += found.remarks
     _check_sequences(project, mine)
@@ -194,11 +203,23 @@ def shot(
     return ShotResult(tuple(done), (*remarks, *_remarks(done)), number, found, film)
 
 
-def _comp_pattern(over: str | os.PathLike[str] | None, plate: PlateSettings | None, frames: Sequence[int]) -> str:
+def _own_plate(project: Project) -> PlateShot:
+    """Return the plate that the project names, checked for a comp."""
+    from .plates.found_lights import backplate_shot
+    from .plates.plate_frame import check_comp
+
+    found = backplate_shot(project)
+    check_comp(project, found.size_px)
+    return found
+
+
+def _comp_pattern(
+    over: str | os.PathLike[str] | None, plate: PlateSettings | None, project: Project, frames: Sequence[int]
+) -> str:
     """Return the checked file name of the comps; empty if none is wanted."""
     if over is None:
         return ""
-    if plate is None:
+    if plate is None and project.plate is None:
         raise ProjectError("a comp is laid over a plate, and there is none; give a plate, or omit --over")
     pattern = FramePattern(os.fspath(over))
     pattern.check(frames)
@@ -226,6 +247,8 @@ def _keep_sequences(
 ) -> None:
     """Raise an error if a frame would replace one that is read, or another one that is written."""
     read = {*holdout_files(project), *(() if plate is None else (plate.files, plate.matte))} - {None}
+    if project.plate is not None:
+        read.add(project.plate.image)
     known = {FramePattern(name).path(frame).resolve() for name in read for frame in frames}
     for pattern in outputs:
         written = {pattern.path(frame).resolve() for frame in frames}

@@ -231,6 +231,9 @@ def _without_effect(options: RenderOptions, settings: Project) -> list[str]:
             f"one frame is drawn, with the plain values of the project; keys of {', '.join(moving)} are left out: "
             "--frame N or --time S draws one of them, flarewright shot all"
         )
+    if settings.plate is not None:
+        comp = "; flarewright shot --over writes the comp" if settings.plate.lit else ""
+        remarks.append(f"the plate is not drawn, only the flare{comp}")
     return remarks
 
 

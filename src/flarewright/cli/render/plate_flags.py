@@ -9,6 +9,7 @@ from ...errors import ProjectError
 from .options.plate import CompOptions, PlateOptions
 
 if TYPE_CHECKING:
+    from ...model import Backplate
     from ...plates.settings import PlateSettings
 
 __all__ = ["plate_settings"]
@@ -17,7 +18,7 @@ __all__ = ["plate_settings"]
 _FLAGS = tuple(each.name for kind in (PlateOptions, CompOptions) for each in fields(kind))
 
 
-def plate_settings(plate: str | None, options: PlateOptions) -> PlateSettings | None:
+def plate_settings(plate: str | None, options: PlateOptions, own: Backplate | None = None) -> PlateSettings | None:
     """Return the settings of a plate; None without one.
 
     Parameters
@@ -25,6 +26,8 @@ def plate_settings(plate: str | None, options: PlateOptions) -> PlateSettings | 
     plate : str or None
         Its file name.
     options : PlateOptions
+    own : Backplate, optional
+        Plate of the project: its search has the defaults, and a comp needs no other plate.
 
     Raises
     ------
@@ -33,12 +36,15 @@ def plate_settings(plate: str | None, options: PlateOptions) -> PlateSettings | 
     """
     given = [name for name in _FLAGS if getattr(options, name, None) is not None]
     if plate is None:
+        if own is not None and "over" in given:
+            given.remove("over")
         if given:
             flag = given[0].replace("_", "-")
             raise ProjectError(f"--{flag} is for a plate, and none is given; add its file, or omit --{flag}")
         return None
     from ...io.images.transfer import TRANSFERS
     from ...plates.settings import PlateSettings, parse_source
+    from ...workflow.plates.found_lights import search_values
 
     if options.threshold is not None and options.stops is not None:
         raise ProjectError("--threshold and --stops both say which pixels are lights; keep one")
@@ -53,4 +59,8 @@ def plate_settings(plate: str | None, options: PlateOptions) -> PlateSettings | 
         "highlights": options.highlights, "white": options.white,
         "source": None if options.source is None else parse_source(options.source),
     }  # fmt: skip
+    base = {} if own is None else search_values(own)
+    if options.stops is not None:
+        base.pop("threshold")
+    values = {**base, **{key: value for key, value in values.items() if value is not None}}
     return PlateSettings(plate, **{key: value for key, value in values.items() if value is not None})  # type: ignore[arg-type]

@@ -20,7 +20,7 @@ from .options.record import RenderOptions
 from .options.shot import ShotOptions
 
 if TYPE_CHECKING:
-    from ...model import Project
+    from ...model import Backplate, Project
     from ...plates.settings import PlateSettings
     from ...workflow.plates.plate_sources import PlateShot
     from ...workflow.shot_frame import FrameResult
@@ -46,7 +46,7 @@ def shot(options: ShotOptions) -> None:
 
     parts = _parts(options.parts)
     _check_movie(options)
-    plate = plate_settings(options.plate, options)
+    plate = plate_settings(options.plate, options, _own_plate(options))
     project, remarks = _project(options, plate)
     _keep_inputs(options, project, plate)
     started = time.monotonic()
@@ -111,6 +111,15 @@ def _check_movie(options: ShotOptions) -> None:
         if value is not None and options.movie is None:
             raise ProjectError(f"{flag} is for the film, and none is made; add --movie FILM.mp4, or omit {flag}")
     check_look(options.view, options.exposure)
+
+
+def _own_plate(options: ShotOptions) -> Backplate | None:
+    """Return the plate that a project file names."""
+    if options.project is None or (options.plate is None and options.over is None):
+        return None
+    from ...io.project.project_file import read_project
+
+    return read_project(options.project).plate
 
 
 def _parts(text: str | None) -> Literal["multi", "single"]:

@@ -393,7 +393,7 @@ def _export(workspace: Workspace, request: Request, _body: Any) -> Any:
         raise ProjectError(f"there is no export {kind!r}; known are {', '.join(files.SUFFIXES)}")
     stem = Path(workspace.session.file).stem if workspace.session.file else "flare"
     name = {"Content-Disposition": f'attachment; filename="{_plain(stem)}{files.SUFFIXES[kind]}"'}
-    if kind == "exr":
+    if kind in ("exr", "comp"):
         folder = Path(tempfile.mkdtemp(prefix="flarewright-"))
         workspace.exports.add(folder)
         path = folder / "flare.exr"
@@ -404,7 +404,8 @@ def _export(workspace: Workspace, request: Request, _body: Any) -> Any:
             workspace.session.tell({"type": "export", "part": part, "what": what})
 
         try:
-            files.export_picture(project, path, progress)
+            export = files.export_picture if kind == "exr" else files.export_comp
+            export(project, path, progress)
         except BaseException:
             workspace.drop_export(folder)
             raise

@@ -41,7 +41,8 @@ PLACE_MM = (10.5, 5.6)
 F_NUMBER = 8.0
 PICTURES = PLATE_SUFFIXES
 SUFFIXES: dict[str, str] = {
-    "exr": ".exr", "png": ".png", "lens": ".lens.toml", "project": ".toml", "look": ".look.toml", "csv": ".csv",
+    "exr": ".exr", "comp": ".comp.exr", "png": ".png", "lens": ".lens.toml",
+    "project": ".toml", "look": ".look.toml", "csv": ".csv",
 }  # fmt: skip
 
 
@@ -305,6 +306,28 @@ def export_picture(project: Project, path: Path, progress: Progress | None = Non
         pixel_aspect=rendering.project.camera.pixel_aspect, colorspace=project.output.colorspace,
         compression=project.output.compression,
     )  # fmt: skip
+
+
+def export_comp(project: Project, path: Path, progress: Progress | None = None) -> None:
+    """Render a project at its size and quality over its plate, in the values of the plate.
+
+    Raises
+    ------
+    FlarewrightError
+        There is no plate, its lights were not found, or the picture has another size.
+    """
+    # imports SciPy, which the editor does not need without a plate
+    from ...workflow.plates.found_lights import backplate_shot
+    from ...workflow.plates.plate_frame import check_comp, write_comp
+
+    if project.plate is None or not project.plate.lit:
+        raise ProjectError("the comp needs the lights of a plate; drop a photograph on the page, and find its lights")
+    plate = backplate_shot(project)
+    project = project.replace(output=project.output.replace(layers="passes"))
+    check_comp(project, plate.size_px)
+    rendering = render_any(project, progress=progress, limit=True)
+    metadata = {"version": __version__, "project": project_text(project)}
+    write_comp(path, plate, 1, rendering.layers, project, metadata, {})
 
 
 def lens_text(project: Project) -> str:

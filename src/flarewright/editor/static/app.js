@@ -272,6 +272,7 @@ function header() {
 const exports = [
   ['Save as…', saveAs, 'Save the project under another name, which becomes its file (Ctrl+Shift+S).'],
   ['EXR with layers', () => download('exr'), 'Rendered at the size and quality of the project; takes as long as a render. Values are irradiances times its attribute flarewright.scale.'],
+  ['Comp as EXR', () => download('comp'), 'The plate with its flare, in the values of the plate; for lights that were found in it.'],
   ['PNG as shown', () => download('png')],
   ['Lens file', () => download('lens')],
   ['Project file', () => download('project')],
@@ -280,7 +281,7 @@ const exports = [
   ['Copy as command line', copyCommand],
 ];
 async function download(kind) {
-  if (kind === 'exr') toast('Rendering the EXR…');
+  if (['exr', 'comp'].includes(kind)) toast('Rendering the EXR…');
   try {
     // wait for pending changes, to export what the page shows
     await line(() => {});

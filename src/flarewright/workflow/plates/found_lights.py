@@ -14,15 +14,26 @@ from ...jobs.frame_list import FramePattern
 from ...model import Backplate, Light, LightCurve, LightKey, Project
 from ...model.project.backplate import found_in_plate
 from ...model.project.light import LEAST_LIGHT_DEG, Polygon, Rectangle
-from ...plates.lights import lights_at
+from ...plates.detection import Sources
+from ...plates.lights import lights_at, plate_tracks
 from ...plates.marked import light_rows
 from ...plates.settings import PlateSettings, parse_source
+from ...plates.tracking import follow
 from ...render.scene.pixel_place import field_angles_at, image_px
 from ...typing import Progress
 from .plate_frame import check_plate, plate_images, plate_optics, same_optics
 from .plate_sources import PlateShot, plate_picture, plate_shot
 
-__all__ = ["FoundLights", "kept_on_plate", "plate_settings_of", "search_plate", "with_found_lights"]
+__all__ = [
+    "FoundLights",
+    "backplate_shot",
+    "kept_on_plate",
+    "plate_settings_of",
+    "search_plate",
+    "search_values",
+    "with_found_lights",
+    "without_found_lights",
+]
 
 # frame of a single plate
 _FRAME = 1
@@ -60,13 +71,18 @@ def plate_settings_of(plate: Backplate) -> PlateSettings:
     """
     if FramePattern(plate.image).numbered:
         raise ProjectError(f"{plate.image} stands for a sequence; give the file of one frame")
+    return PlateSettings(plate.image, **search_values(plate))
+
+
+def search_values(plate: Backplate) -> dict[str, Any]:
+    """Return how a plate is read and searched, as fields of `PlateSettings`."""
     search = plate.search
-    return PlateSettings(
-        plate.image, layer=plate.layer, transfer=plate.transfer, threshold=search.threshold, stops=search.stops,
-        least_px=search.least_px, most_lights=search.most_lights, point_px=search.point_px, gain=search.gain,
-        highlights=search.highlights, white=search.white,
-        source=None if search.source is None else parse_source(search.source),
-    )  # fmt: skip
+    return {
+        "layer": plate.layer, "transfer": plate.transfer, "threshold": search.threshold, "stops": search.stops,
+        "least_px": search.least_px, "most_lights": search.most_lights, "point_px": search.point_px,
+        "gain": search.gain, "highlights": search.highlights, "white": search.white,
+        "source": None if search.source is None else parse_source(search.source),
+    }  # fmt: skip
 
 
 def search_plate(plate: Backplate, progress: Progress | None = None) -> FoundLights:
@@ -103,9 +119,8 @@ def with_found_lights(project: Project, found: FoundLights) -> tuple[Project, tu
     Parameters
     ----------
     project : Project
-        A picture of another shape becomes one of the plate's size, on the same width of the sensor. If its lights are
-        those of a plate already, found ones are replaced and others stay; else all are replaced, for theirs is another
-        unit.
+        Its picture gets the size of the plate, on the same width of the sensor. If its lights are those of a plate
+        already, found ones are replaced and others stay; else all are replaced, for theirs is another unit.
     found : FoundLights
 
     Returns
@@ -118,7 +133,7 @@ def with_found_lights(project: Project, found: FoundLights) -> tuple[Project, tu
     FlarewrightError
         The project is a measured flare, or its lens images too little of the picture.
     """
-    framed = _framed(project, found.shot)
+    framed = _framed(project, found.shot.size_px)
     directions, factor = plate_optics(framed)
     try:
         lights, lost = lights_at(found.shot.lights, _FRAME, directions, factor, framed.camera.size_px)
@@ -141,21 +156,55 @@ def with_found_lights(project: Project, found: FoundLights) -> tuple[Project, tu
     return changed, tuple(remarks)
 
 
-def _framed(project: Project, shot: PlateShot) -> Project:
-    """Return the project with a picture of the plate's shape."""
-    try:
-        check_plate(project, shot.size_px)
-    except ProjectError:
-        camera = project.camera
-        width, height = shot.size_px
-        if camera.sensor_mm is not None:
-            # the same pixels' shape on the same width
-            across, down = camera.sensor_mm
-            tall = down / across * camera.size_px[0] / camera.size_px[1]
-            camera = camera.replace(sensor_mm=(across, across * tall * height / width))
-        changed: Project = project.replace(camera=camera.replace(size_px=shot.size_px))
-        return changed
-    return project
+def _framed(project: Project, size_px: tuple[int, int]) -> Project:
+    """Return the project with a picture of the plate's size, whose pixels keep their shape on the same width."""
+    camera = project.camera
+    if camera.size_px == size_px:
+        return project
+    if camera.sensor_mm is not None:
+        across, down = camera.sensor_mm
+        high = down * (size_px[1] / size_px[0]) / (camera.size_px[1] / camera.size_px[0])
+        camera = camera.replace(sensor_mm=(across, high))
+    changed: Project = project.replace(camera=camera.replace(size_px=size_px))
+    return changed
+
+
+def without_found_lights(project: Project) -> Project:
+    """Return a project without the lights that were found in its plate, for another search of a plate.
+
+    Dark if it has no others.
+    """
+    if project.plate is None or not project.plate.lit:
+        return project
+    own = tuple(light for light in project.lights if not found_in_plate(light))
+    changed: Project = project.replace(lights=own or (Light(field_deg=(0.0, 0.0), intensity=0.0),))
+    return changed
+
+
+def backplate_shot(project: Project) -> PlateShot:
+    """Return the plate of a project for a comp; its lights are those of the project, so none is searched.
+
+    Raises
+    ------
+    FlarewrightError
+        The project has no plate, or lights in another unit, or the plate cannot be read.
+    """
+    plate = project.plate
+    if plate is None:
+        raise ProjectError("a comp is laid over a plate, and there is none; give a plate, or omit --over")
+    if plate.lights_above is None:
+        raise ProjectError(
+            "the lights of the project are not those of its plate, so the flare has another unit; find the lights in "
+            "the editor, or give the plate on the command line"
+        )
+    settings = plate_settings_of(plate)
+    picture = plate_picture(settings, _FRAME)
+    none = Sources.from_table(np.zeros((0, 10)))
+    tracks = follow((_FRAME,), [none], picture.size_px[0])
+    return PlateShot(
+        settings, plate.lights_above, picture.size_px, picture.pixel_aspect, picture.fps,
+        plate_tracks(tracks, picture.size_px), (0,), picture.remarks,
+    )  # fmt: skip
 
 
 def kept_on_plate(before: Project, after: Project) -> Project:

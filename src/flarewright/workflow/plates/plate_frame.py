@@ -153,7 +153,8 @@ def check_comp(project: Project, size_px: tuple[int, int]) -> None:
     if project.camera.size_px != size_px:
         raise ProjectError(
             f"the comp needs the size of the plate, {size_px[0]}x{size_px[1]}, not "
-            f"{project.camera.size_px[0]}x{project.camera.size_px[1]}; omit --size or --over"
+            f"{project.camera.size_px[0]}x{project.camera.size_px[1]}; give --size "
+            f"{size_px[0]}x{size_px[1]}, or omit --over"
         )
     if project.output.layers == "beauty":
         raise ProjectError("the comp needs the passes, for the plate shows the lights already; omit --layers beauty")
