@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,8 @@ SLOW_S, FAST_S = 0.04, 0.024
 # number of consecutive slow or fast pictures before the size changes, to ignore single delays
 STREAK = 4
 QUALITY = 80
+# from so many lights on, a drag draws only the one that moves
+FEW_LIGHTS = 3
 # the target picture is secondary: most of the time is for the picture itself
 TARGET_SCALE = SCALES[2]
 
@@ -74,6 +77,8 @@ class Drag:
         self._streak = 0
         self._sheets: tuple[StarburstCanvas, ...] = ()
         self._target_sheets: tuple[StarburstCanvas, ...] = ()
+        # the light of all lights but the dragged one, with what determines it
+        self._others: tuple[Any, DrawnPicture] | None = None
 
     def picture(self, moved: Callable[[Project], Project], revision: int) -> Moved | None:
         """Draw the project in the state of the drag.
@@ -100,7 +105,7 @@ class Drag:
                 return None
             started = time.perf_counter()
             project = moved(session.project)
-            drawn = self._drawn(project, session.view)
+            drawn = self._one_moved(session.project, project, session.view) or self._drawn(project, session.view)
             self._adapt_size(time.perf_counter() - started)
             if revision != session.revision:
                 # the drag has ended meanwhile; leave all time to the final picture
@@ -154,6 +159,37 @@ class Drag:
             return
         with self._one, suppress(FlarewrightError):
             self._drawn(project, self.screen.session.view)
+
+    def _one_moved(self, before: Project, project: Project, view: View) -> DrawnPicture | None:
+        """Draw the one light of many that moves, and add the others, which are drawn once; None if it is no such drag.
+
+        Light adds up, so the sum is the picture of all.
+        """
+        if len(project.lights) < FEW_LIGHTS or not _by_matrices(project, view):
+            return None
+        pairs = zip(before.lights, project.lights, strict=True)
+        moving = [k for k, (old, new) in enumerate(pairs) if old != new]
+        if len(moving) != 1:
+            return None
+        (k,) = moving
+        scale, levels = SCALES[self._scale], levels_at(self.screen.match, project)
+        others = project.replace(lights=(*project.lights[:k], *project.lights[k + 1 :]))
+        key = (render_picture.pictured(others), scale, levels)
+        if self._others is None or self._others[0] != key:
+            self._others = key, render_picture.take(others, "moving", view, scale=scale, levels=levels)
+        rest = self._others[1]
+        alone = project.replace(lights=(project.lights[k],))
+        still = moving_picture(render_picture.moving_stage(alone, scale, levels), self._sheets)
+        if still is None:
+            one = render_picture.take(alone, "moving", view, scale=scale, levels=levels)
+        else:
+            self._sheets = still.sheets
+            one = DrawnPicture(alone, "moving", still.ghosts, still.rest, 0.0)
+        haze = [each.haze for each in (one, rest) if each.haze is not None]
+        return DrawnPicture(
+            project, "moving", one.ghosts + rest.ghosts, one.rest + rest.rest, one.seconds, one.remarks,
+            haze=sum(haze[1:], haze[0]) if haze else None,
+        )  # fmt: skip
 
     def _drawn(self, project: Project, view: View) -> DrawnPicture | DragPicture:
         scale, levels = SCALES[self._scale], levels_at(self.screen.match, project)

@@ -36,6 +36,9 @@ SOON_TOLERANCE_PX = SCREEN_PX
 HASTY_TOLERANCE_PX = 2.0
 # any plate with the lights of a project
 _ANY_LIT = Backplate(image="any", lights_above=1.0)
+# more area lights are points in quick pictures
+MOST_WIDE_LIGHTS = 2
+POINTS = "area lights are points until the full picture is drawn"
 NO_RINGS = (
     "the screen leaves out rings inside ghosts, which are slow with an image, dirt, cylinders or spectral lines; "
     "files have them"
@@ -82,7 +85,7 @@ def staged(
     room : tuple of int, optional
         As in `rest_size`, for a picture at rest.
     hasty : bool
-        A traced preview may be coarser in steps, rims and rings, to save time.
+        A traced preview may be coarser in steps, rims and rings, to save time; many area lights are points.
 
     Returns
     -------
@@ -92,6 +95,8 @@ def staged(
         project = project.replace(lens=_loaded(project.lens, lens_path(project.lens).stat().st_mtime_ns))
     size = view_size(project, scale) if room is None else rest_size(project, room)
     camera = project.camera.replace(size_px=size, sensor_mm=project.camera.sensor)
+    if hasty or grade in ("moving", "draft"):
+        project = _pointlike(project)
     own = project.quality
     if grade in ("soon", "final"):
         # reference quality is for files: it never finishes
@@ -106,6 +111,16 @@ def staged(
         quality = Quality(mode="draft", wavelengths=DRAFT_WAVELENGTHS, paths=own.paths)
     output = Output(layers="passes", starburst=project.output.starburst)
     found: Project = project.replace(camera=camera, quality=quality, output=output)
+    return found
+
+
+def _pointlike(project: Project) -> Project:
+    """Return a project without area lights, if it has many: the blur of their ghosts takes most of the time."""
+    wide = [light.diameter_deg > 0.0 or light.shape is not None for light in project.lights]
+    if sum(wide) <= MOST_WIDE_LIGHTS:
+        return project
+    lights = tuple(light.replace(diameter_deg=0.0, shape=None) for light in project.lights)
+    found: Project = project.replace(lights=lights)
     return found
 
 
@@ -179,6 +194,8 @@ def take(
     scattered = [layer for layer in parts if not layer.name.startswith(("ghosts", "starburst"))]
     haze = spread_layers(scattered, size) if scattered else None
     reported = rendering.remarks
+    if hasty and _pointlike(project) is not project:
+        reported = (*reported, POINTS)
     if grade == "final" and _slow_rings(stage.replace(quality=project.quality)):
         reported = (*reported, NO_RINGS)
     return DrawnPicture(project, grade, ghosts, rest, time.perf_counter() - started, reported, haze=haze)
