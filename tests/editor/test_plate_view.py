@@ -78,7 +78,7 @@ def test_flare_and_plate_have_one_exposure_once_the_lights_are_found(screen_size
     session.writer.close()
 
 
-def test_a_drag_of_one_light_of_many_shows_all(shot):
+def test_a_drag_of_one_light_of_many_shows_all(shot, monkeypatch):
     session, _ = begin(None)
     first = shot.lights[0]
     places = ((-6.0, 2.0), (3.0, -4.0), (7.0, 3.0))
@@ -91,6 +91,7 @@ def test_a_drag_of_one_light_of_many_shows_all(shot):
     drag = Drag(screen)
     drawn = []
     draw = drag._pixels
+    monkeypatch.setattr(drag, "_adapt_size", lambda seconds: None)
     drag._pixels = lambda picture: drawn.append(picture) or draw(picture)
     for x in (2.0, 1.0):
         moved = drag.picture(lambda project, x=x: move_light(project, 1, x, -3.0), session.revision)

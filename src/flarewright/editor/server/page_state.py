@@ -50,7 +50,7 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
         "steps": {"at": history.at, "count": len(history.moments)},
         "lens": _lens(project, table.facts, table.problem)
         | {"table": table_of(project), "rows": list(table.rows), "distortion": list(table.distortion)},
-        "lights": [_light(project, k) for k in range(len(project.lights))],
+        "lights": _lights(project, bool(table.distortion)),
         "camera": project.camera.model_dump(mode="json") | {"sensor": list(project.camera.sensor)},
         "iris": _iris(project, history),
         "dirt": project.dirt.model_dump(mode="json"),
@@ -129,6 +129,21 @@ def _lens(project: Project, facts: dict[str, float], problem: str) -> dict[str, 
         "presets": list(preset_names(lens)), "stop_row": lens.stop_row,
         "shipped": project.lens if isinstance(project.lens, str) else None,
     }  # fmt: skip
+
+
+def _lights(project: Project, round_lens: bool) -> list[dict[str, Any]]:
+    """Return the lights; on a plate, for a lens that is not round, also where they are traced to."""
+    found = [_light(project, k) for k in range(len(project.lights))]
+    if project.plate is None or not project.plate.lit or round_lens or is_measured(project):
+        return found
+    # imports SciPy, which the editor does not need without a plate
+    from ...workflow.plates.found_lights import traced_places
+
+    try:
+        places = traced_places(project)
+    except FlarewrightError:
+        return found
+    return [light | {"placed": place} for light, place in zip(found, places, strict=True)]
 
 
 def _light(project: Project, k: int) -> dict[str, Any]:

@@ -63,13 +63,24 @@ export function viewport(canvas, app) {
   };
   // place of the optical axis in the picture; for a measured flare it may be off the middle
   const axis = () => app.state.lens.axis_mm ?? [0, 0];
-  const place = (light) => {
+  // The page's place of a light of a lens that is not round is paraxial; on a plate the server traces it, and the
+  // difference stays during a drag.
+  const missed = (light) => {
+    if (!light.placed) return [0, 0];
+    const known = app.state.lights.find((one) => one.name === light.name) ?? light;
+    const [across, down] = app.state.frame.sensor;
+    const paraxial = plainPlace({ ...light, field_deg: known.field_deg });
+    return [(light.placed[0] - 0.5) * across - paraxial[0], (0.5 - light.placed[1]) * down - paraxial[1]];
+  };
+  const place = (light) => { const off = missed(light); return plainPlace(light).map((mm, k) => mm + off[k]); };
+  const plainPlace = (light) => {
     const slopes = light.field_deg.map((deg) => Math.tan(deg * Math.PI / 180));
     const part = efl() * distortion(Math.hypot(...slopes), light);
     return slopes.map((slope, k) => axis()[k] + part * slope);
   };
   function anglesAt(at, light) {
-    const mm = at.map((each, k) => each - axis()[k]);
+    const off = missed(light);
+    const mm = at.map((each, k) => each - axis()[k] - off[k]);
     const reach = Math.hypot(...mm) / efl();
     let [near, far] = [0, Math.tan(STEEPEST * Math.PI / 180)];
     for (let k = 0; k < 40; k++) {
@@ -79,6 +90,7 @@ export function viewport(canvas, app) {
     return mm.map((each) => (reach ? Math.atan(each / efl() * far / reach) * 180 / Math.PI : 0));
   }
   const lightAt = (k) => (self.mover.live && self.mover.lights?.[k]) || app.state.lights[k].field_deg;
+  const placeOf = (k, field) => place({ ...app.state.lights[k], field_deg: field });
   const lightPage = (k) => toPage(...place({ ...app.state.lights[k], field_deg: lightAt(k) }));
   // keep a handle outside the view at the border, so that it can be dragged
   function handle(k) {
@@ -305,8 +317,11 @@ export function viewport(canvas, app) {
         // small rings, which leave the lamps of a city visible
         for (const [ink, thick] of [['#000a', 3], ['#ddd', 1]]) {
           pen.strokeStyle = ink; pen.lineWidth = thick;
+          // there is no lamp at the centroid of joined ones
+          if (!light.starburst) pen.setLineDash([2, 2]);
           pen.beginPath(); pen.arc(x, y, 4, 0, 7); pen.stroke();
         }
+        pen.setLineDash([]);
         return;
       }
       for (let pass = 0; pass < 2; pass++) {
@@ -446,6 +461,11 @@ export function viewport(canvas, app) {
   async function dropLight() {
     const { light, now, group } = self.drag;
     const place = now ?? app.state.lights[light].field_deg;
+    const { placed } = app.state.lights[light];
+    if (placed) {
+      const [mx, my] = placeOf(light, place);
+      app.state.lights[light].placed = [mx / app.state.frame.sensor[0] + 0.5, 0.5 - my / app.state.frame.sensor[1]];
+    }
     app.state.lights[light].field_deg = place.map((deg) => Number(deg.toFixed(4)));
     self.drag = null;
     // the place of the last picture

@@ -31,6 +31,7 @@ __all__ = [
     "plate_settings_of",
     "search_plate",
     "search_values",
+    "traced_places",
     "with_found_lights",
     "without_found_lights",
 ]
@@ -205,6 +206,20 @@ def backplate_shot(project: Project) -> PlateShot:
         settings, plate.lights_above, picture.size_px, picture.pixel_aspect, picture.fps,
         plate_tracks(tracks, picture.size_px), (0,), picture.remarks,
     )  # fmt: skip
+
+
+def traced_places(project: Project) -> list[tuple[float, float] | None]:
+    """Return where the lens images each light, as fractions of the picture from its upper left corner.
+
+    None for a light that the lens does not image.
+    """
+    images = plate_images(project)
+    width, height = project.camera.size_px
+    found = []
+    for light in project.lights:
+        place = image_px(images, light.field_deg)
+        found.append(None if place is None else (place[0] / width, place[1] / height))
+    return found
 
 
 def kept_on_plate(before: Project, after: Project) -> Project:
