@@ -5,12 +5,20 @@ import pytest
 from PIL import Image
 
 from flarewright.errors import FlarewrightError, ProjectError
+from flarewright.io.images.exr import read_exr
 from flarewright.io.images.half import exr_scale
 from flarewright.io.project.project_file import project_text, read_project
-from flarewright.model import Backplate, Camera, Light, LightCurve, LightKey, PlateSearch, Project
+from flarewright.model import Backplate, Camera, Light, LightCurve, LightKey, PlateSearch, Project, Quality
 from flarewright.render.scene.pixel_place import image_px
-from flarewright.workflow.plates.found_lights import kept_on_plate, plate_settings_of, search_plate, with_found_lights
+from flarewright.workflow.plates.found_lights import (
+    kept_on_plate,
+    plate_settings_of,
+    search_plate,
+    with_found_lights,
+    without_found_lights,
+)
 from flarewright.workflow.plates.plate_frame import plate_images, with_plate_lights
+from flarewright.workflow.shot import shot
 
 LAMPS = {(12, 9): (255, 220, 160), (40, 18): (160, 200, 255), (54, 28): (255, 255, 255)}
 """Left upper corners of lamps of 2 x 2 pixels, and their codes."""
@@ -130,3 +138,22 @@ def test_what_cannot_be_searched_is_refused_in_one_sentence(project, plate, tmp_
 
     with pytest.raises(KeyboardInterrupt):
         search_plate(plate, cancel)
+
+
+def test_the_comp_of_a_lit_project_is_that_of_its_plate_and_other_plates_replace_found_lights(lit, project, tmp_path):
+    def comp(of, name, **more):
+        over = tmp_path / f"{name}.####.exr"
+        shot(of, tmp_path / f"{name}-flare.####.exr", frames="1", processes=1, threads=1, over=over, **more)
+        return read_exr(tmp_path / f"{name}.0001.exr").layers[0].pixels
+
+    draft = lit.replace(quality=Quality(mode="draft", wavelengths=3))
+    own = comp(draft, "own")
+    plate = plate_settings_of(lit.plate)
+    dark = draft.replace(lights=(Light(field_deg=(0.0, 0.0), intensity=0.0),), plate=None)
+    np.testing.assert_array_equal(own, comp(dark, "searched", plate=plate))
+    # not twice the light
+    np.testing.assert_array_equal(own, comp(draft, "again", plate=plate))
+    free = draft.replace(plate=draft.plate.replace(lights_above=None))
+    with pytest.raises(ProjectError, match="not those of its plate, so the flare has another unit"):
+        comp(free, "free")
+    assert without_found_lights(free) == free

@@ -89,26 +89,26 @@ def test_a_gain_brightens_found_lights_at_once_and_a_lens_keeps_them_in_place(se
 def test_a_cancelled_or_outdated_search_changes_nothing(session, finder, monkeypatch):
     from flarewright.workflow.plates import found_lights
 
-    begun, go, search = threading.Event(), threading.Event(), found_lights.search_plate
+    started, go, search = threading.Event(), threading.Event(), found_lights.search_plate
 
     def slow(plate, progress):
-        begun.set()
+        started.set()
         assert go.wait(60.0)
         return search(plate, progress)
 
     monkeypatch.setattr(found_lights, "search_plate", slow)
     heard, before = messages(session), session.project
     finder.start()
-    assert begun.wait(60.0)
+    assert started.wait(60.0)
     assert finder.state.running
     finder.stop()
     go.set()
     assert finder.wait(60.0)
     assert (session.project, heard, finder.state.running) == (before, [], False)
     # the plate is another one when the search ends
-    begun.clear(), go.clear()
+    started.clear(), go.clear()
     finder.start()
-    assert begun.wait(60.0)
+    assert started.wait(60.0)
     session.do("set_plate", {"values": {"search": {"stops": 4.0}}})
     go.set()
     assert finder.wait(60.0)

@@ -17,6 +17,7 @@ NAMES = (
     "light", "x", "y", "values", "row", "column", "text", "lens", "ghost", "at_s", "number", "field_deg", "mask",
     "image", "depth", "blades", "rotation_deg", "intensity", "spectrum", "f_number", "zoom", "size_px", "kind", "gain",
     "tint", "seconds", "plate", "look", "exposure_stops", "name", "group", "table", "color", "structure", "from_row",
+    "search", "stops", "threshold", "gain", "layer",
 )  # fmt: skip
 ODD = (
     None, True, False, 0, -1, 1, 7, 10**20, -(10**400), 1e308, -1e-308, 5e-324, 0.5, "", "1", "nan", "inf", "-0", "1,5",
