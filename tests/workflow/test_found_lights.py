@@ -150,9 +150,10 @@ def test_the_comp_of_a_lit_project_is_that_of_its_plate_and_other_plates_replace
     own = comp(draft, "own")
     plate = plate_settings_of(lit.plate)
     dark = draft.replace(lights=(Light(field_deg=(0.0, 0.0), intensity=0.0),), plate=None)
-    np.testing.assert_array_equal(own, comp(dark, "searched", plate=plate))
+    # the order of the lights differs, and so the rounding of their sum to half floats
+    np.testing.assert_allclose(own, comp(dark, "searched", plate=plate), rtol=1e-3)
     # not twice the light
-    np.testing.assert_array_equal(own, comp(draft, "again", plate=plate))
+    np.testing.assert_allclose(own, comp(draft, "again", plate=plate), rtol=1e-3)
     free = draft.replace(plate=draft.plate.replace(lights_above=None))
     with pytest.raises(ProjectError, match="not those of its plate, so the flare has another unit"):
         comp(free, "free")

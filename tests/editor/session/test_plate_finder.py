@@ -1,5 +1,6 @@
 """Lights of the plate in a session: one step of the history, cancelled or refused in words of the page."""
 
+import json
 import threading
 
 import numpy as np
@@ -8,6 +9,7 @@ from PIL import Image
 
 from flarewright.editor.preview.display_image import png
 from flarewright.editor.server.uploads import take_in
+from flarewright.editor.session.autosave import Saved, read_autosave, write_autosave
 from flarewright.editor.session.plate_finder import PlateFinder, outlined
 from flarewright.editor.session.session import begin
 from flarewright.errors import ProjectError
@@ -154,3 +156,13 @@ def test_a_plate_is_opened_by_its_path_and_names_of_sequences_are_plain(session,
     take_in(session, "frame.####.png", png(night()))
     assert len(outlined(session, lambda *_: None)["lights"]) == 3
     assert isinstance(session.project.lights[0], Light)
+
+
+def test_an_autosave_with_a_background_of_the_view_is_read(session, tmp_path):
+    path = tmp_path / "old.autosave.json"
+    write_autosave(path, Saved(session.history, session.view, None, False))
+    data = json.loads(path.read_text("utf-8").splitlines()[0])
+    data["view"]["plate"] = "sky.png"
+    # without a digest, as the first ones
+    path.write_text(json.dumps(data), "utf-8")
+    assert read_autosave(path).history.present == session.project

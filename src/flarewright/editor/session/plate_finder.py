@@ -18,6 +18,8 @@ from .session import Session
 
 # work shorter than this reports no progress, seconds
 PROGRESS_AFTER_S = 0.6
+# more area lights make full pictures slow
+FEW_WIDE_LIGHTS = 4
 # what the command line calls the page's settings
 _PAGE_WORDS = {
     "; --threshold sets another value": "",
@@ -102,6 +104,8 @@ class PlateFinder:
         except (FlarewrightError, ValidationError) as error:
             check()
             self._end(page_words(str(error), self.session), "warning")
+        except MemoryError:
+            self._end("there is not enough memory to search this plate; give a smaller one", "warning")
         except Exception:
             check()
             self._end("The lights were not found: an internal error, printed in the terminal", "warning")
@@ -130,6 +134,11 @@ class PlateFinder:
                 raise ProjectError("the plate was changed during the search, so no lights were placed; find them again")
             project, remarks = with_found_lights(self.session.project, found)
             self.session.put(project, "Find lights", placed=True)
+        wide = sum(light.shape is not None or light.diameter_deg > 0.0 for light in project.lights)
+        if wide > FEW_WIDE_LIGHTS:
+            remarks += (
+                f"{wide} of them are area lights, whose ghosts take long: Points below makes small ones points",
+            )
         return tuple(page_words(words, self.session) for words in remarks if not words.startswith(_SHOWN))
 
     def _end(self, words: str, kind: str) -> None:

@@ -186,12 +186,16 @@ class Session:
             self._stamps[file] = stamp
 
     def open(self, text: str) -> None:
-        """Open another project or lens, as a step of the history."""
+        """Open another project or lens, or a picture as the plate, as a step of the history."""
+        place = expanded(text.strip())
+        if place.suffix.lower() in PICTURES:
+            self.reach.check(place)
+            # a large file is read before the session is locked
+            read_plate(place)
+            self.do("set_plate", {"values": {"image": str(place.resolve())}})
+            return
         with self.lock:
             self.reach.check_name(text.strip())
-            if expanded(text.strip()).suffix.lower() in PICTURES:
-                self._open_picture(expanded(text.strip()))
-                return
             project, file, stamps = _stamped(partial(opened, allowed=self.reach.check_project), text)
             if file is not None:
                 self._set_contents(file, project)
@@ -202,11 +206,6 @@ class Session:
                 # the project is unchanged, but a picture that it names may exist now
                 self._changed()
             self._move(history)
-
-    def _open_picture(self, path: Path) -> None:
-        """Put a picture under the flare, read where it lies."""
-        read_plate(path)
-        self.do("set_plate", {"values": {"image": str(path.resolve())}})
 
     def _set_contents(self, file: str, project: Project | None) -> None:
         if project is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from ...plates.settings import PlateSettings, parse_source
 from ...plates.tracking import follow
 from ...render.scene.pixel_place import field_angles_at, image_px
 from ...typing import Progress
-from .plate_frame import check_plate, plate_images, plate_optics, same_optics
+from .plate_frame import bare_text, check_plate, images_of, plate_images, plate_optics, same_optics
 from .plate_sources import PlateShot, plate_picture, plate_shot
 
 __all__ = [
@@ -213,13 +214,16 @@ def traced_places(project: Project) -> list[tuple[float, float] | None]:
 
     None for a light that the lens does not image.
     """
-    images = plate_images(project)
+    key = bare_text(project)
     width, height = project.camera.size_px
-    found = []
-    for light in project.lights:
-        place = image_px(images, light.field_deg)
-        found.append(None if place is None else (place[0] / width, place[1] / height))
-    return found
+    places = [_traced(key, light.field_deg) for light in project.lights]
+    return [None if place is None else (place[0] / width, place[1] / height) for place in places]
+
+
+@lru_cache(maxsize=4096)
+def _traced(lens: str, field_deg: tuple[float, float]) -> tuple[float, float] | None:
+    """Return where a lens (`plate_frame.bare_text`) images a light, pixels."""
+    return image_px(images_of(lens), field_deg)
 
 
 def kept_on_plate(before: Project, after: Project) -> Project:

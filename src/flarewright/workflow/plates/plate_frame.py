@@ -22,9 +22,11 @@ from .plate_sources import PlateShot
 
 __all__ = [
     "alike_lights",
+    "bare_text",
     "check_comp",
     "check_plate",
     "comp_attributes",
+    "images_of",
     "plate_images",
     "plate_optics",
     "same_optics",
@@ -88,21 +90,26 @@ def plate_optics(project: Project) -> tuple[FieldMap, float]:
     ProjectError
         The project is a measured flare, whose lens is unknown.
     """
-    return _optics_of(_bare_text(project))[:2]
+    return _optics_of(bare_text(project))[:2]
 
 
 def plate_images(project: Project) -> DirectImages:
     """Return the direct images of the project's lens, which trace a light to its place; errors as `plate_optics`."""
-    return _optics_of(_bare_text(project))[2]
+    return images_of(bare_text(project))
+
+
+def images_of(lens: str) -> DirectImages:
+    """Return the direct images of a lens that `bare_text` describes."""
+    return _optics_of(lens)[2]
 
 
 def same_optics(one: Project, other: Project) -> bool:
     """Return whether the lenses of two projects image a plate alike, with the same brightness."""
-    return _bare_text(one) == _bare_text(other)
+    return bare_text(one) == bare_text(other)
 
 
-def _bare_text(project: Project) -> str:
-    """Return what bends and dims the direct image, as a key of its traced places."""
+def bare_text(project: Project) -> str:
+    """Return what bends and dims the direct image, as a key of its traced places; errors as `plate_optics`."""
     if is_measured(project):
         raise ProjectError(
             f"{project.lens} is a measured flare, whose lens is unknown, so places in a plate have no angles; give a "
