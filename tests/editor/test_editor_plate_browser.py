@@ -95,4 +95,9 @@ def test_lights_of_a_dropped_photograph_are_found_dragged_and_undone(tab):
     tab.page.keyboard.press("Control+z")
     tab.until("!flarewright.state.plate.lit")
     assert tab.state()["lights"] == before
+    # without the plate
+    tab.page.click("#plate-none")
+    tab.until("!flarewright.state.plate")
     tab.rest()
+    assert tab.page.locator("#find-lights").is_hidden()
+    assert not tab.page.locator("#plate-words").is_visible()

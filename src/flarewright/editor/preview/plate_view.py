@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import FileError, ProjectError
 from ...io.files.door import shown
 from ...io.images.plate_picture import PlatePicture, read_plate
-from ...model import Backplate
+from ...model import Backplate, PlateSearch
 from ...typing import Pixels
 from .picture import DrawnPicture
 
@@ -49,9 +49,9 @@ def plate_for(plate: Backplate | None, size_px: tuple[int, int]) -> ShownPlate |
         changed = Path(plate.image).stat().st_mtime_ns
     except (OSError, ValueError):
         raise ProjectError(f"the plate {plate.image} is gone; choose another") from None
-    # of the search only what the comp shows; a moved slider must not read the file again
-    kept = plate.replace(search=type(plate.search)(gain=plate.search.gain, highlights=plate.search.highlights,
-                                                   white=plate.search.white, source=plate.search.source))  # fmt: skip
+    # of the search only what the comp shows: a moved slider must not make the mask again
+    gain = 2.0 if plate.search.brightened else 1.0
+    kept = plate.replace(search=PlateSearch(gain=gain, highlights=plate.search.highlights))
     return _shown(kept, changed, size_px)
 
 

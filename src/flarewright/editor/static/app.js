@@ -248,7 +248,7 @@ function header() {
   exposed.className = 'exposure';
   $('bar').append(
     h('span', { class: 'brand' }, 'Flarewright'),
-    button('Open', openFile, { tip: 'Open a project, a lens file, a measured flare, or a lens by name (O).', id: 'open' }),
+    button('Open', openFile, { tip: 'Open a project, a lens file, a measured flare, a photograph, or a lens by name (O).', id: 'open' }),
     button('Save', () => save(), { tip: 'Save the project file (Ctrl+S).', id: 'save' }),
     button('Export ▾', (event) => menu(event.currentTarget, exports), { id: 'export', tip: 'The project under another name, pictures, lens, table of ghosts, or the command that renders the saved project.' }),
     file, h('span', { class: 'split' }), undo, redo, h('span', { class: 'gap' }), exposed, auto, look,
@@ -332,7 +332,7 @@ function asking(title, words, value, path, done = () => {}) {
   box.focus(); box.select();
 }
 const saved = (state) => toast(state.reported, 'good', 4500, 'api/save');
-function openFile() { asking('Open', 'A project file, a lens file, a measured flare, or a lens’ name. Files can also be dropped on the page.', '', 'api/open'); }
+function openFile() { asking('Open', 'A project file, a lens file, a measured flare, a photograph, or a lens’ name. Files can also be dropped on the page.', '', 'api/open'); }
 function saveAs() { asking('Save', 'Path of the project file, like shot.toml.', app.state.file ?? 'flare.toml', 'api/save', saved); }
 async function save() {
   const text = app.state.file;

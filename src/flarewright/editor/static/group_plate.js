@@ -9,15 +9,15 @@ export function plateGroup(app) {
   // outlines of what a search would find; the handles of found lights replace them
   let outlines = true;
   let shown = false;
-  app.plateLights = () => (shown && outlines && found.size && app.state.plate ? found : null);
+  app.plateLights = () => (shown && outlines && found.size && app.state.plate?.image === found.image ? found : null);
   // the gain changes no outline
   const keyOf = (s) => JSON.stringify([s.plate.image, s.plate.layer, s.plate.transfer, { ...s.plate.search, gain: 1 }]);
   const look = latest(async () => {
     const { plate } = app.state;
-    if (!plate || !shown || !outlines || app.state.finding.running) return;
+    if (!plate || !shown || !outlines || app.state.finding.running || app.state.lens.measured) return;
     const key = keyOf(app.state);
     if (key === found.key) return;
-    Object.assign(found, { size: null, lights: [], words: '' }, await get('api/plate/lights'), { key });
+    Object.assign(found, { size: null, lights: [], words: '' }, await get('api/plate/lights'), { key, image: plate.image });
     tell(app.state);
     app.view.redraw();
     // the settings may have changed meanwhile
@@ -67,10 +67,10 @@ export function plateGroup(app) {
     cancel.hidden = meter.hidden = !run.running;
     bar.style.width = `${100 * run.part}%`;
     if (run.running) words.textContent = `${run.words}…`;
-    else if (outlines && found.key) words.textContent = `${found.lights.length ? `${found.lights.length} light${found.lights.length > 1 ? 's' : ''} outlined${s.plate.lit ? ', those of the next search' : ''}. ` : ''}${found.words ? sentence(found.words) : ''}`;
+    else if (outlines && s.plate && found.key === keyOf(s)) words.textContent = `${found.lights.length ? `${found.lights.length} light${found.lights.length > 1 ? 's' : ''} outlined${s.plate.lit ? ', those of the next search' : ''}. ` : ''}${found.words ? sentence(found.words) : ''}`;
     else words.textContent = s.plate?.lit ? 'The lights are those of the plate; the flare has its unit. Another f-number or lens keeps them in place.' : '';
   }
-  const all = group('Plate', [{ element: files, update: (s) => { name.textContent = s.plate ? s.plate.image.split(/[\\/]/).pop() : 'drop a photograph here'; name.title = s.plate?.image ?? ''; } }, visible, exposure, threshold, gain, outline, further, buttons, words, ...more.map((one) => ({ element: h('span', { hidden: true }), update: one.update }))]);
+  const all = group('Plate', [{ element: files, update: (s) => { name.textContent = s.plate ? s.plate.image.split(/[\\/]/).pop() : 'drop a photograph here'; name.title = s.plate?.image ?? ''; } }, visible, exposure, threshold, gain, outline, { element: further, update: (s) => more.forEach((one) => one.update(s)) }, buttons, words]);
   const { update } = all;
   return Object.assign(all, {
     update(s) {
