@@ -8,8 +8,9 @@ from flarewright.errors import FlarewrightError, ProjectError
 from flarewright.io.images.exr import read_exr
 from flarewright.io.images.half import exr_scale
 from flarewright.io.project.project_file import project_text, read_project
-from flarewright.model import Backplate, Camera, Light, LightCurve, LightKey, PlateSearch, Project, Quality
+from flarewright.model import Backplate, Camera, Light, LightCurve, LightKey, PlateSearch, Project, Quality, Surface
 from flarewright.render.scene.pixel_place import image_px
+from flarewright.render.scene.resolve import load_lens
 from flarewright.workflow.plates.found_lights import (
     kept_on_plate,
     plate_settings_of,
@@ -74,6 +75,14 @@ def test_another_lens_keeps_lights_on_the_plate_as_a_new_search_would_place_them
         assert one.intensity == pytest.approx(other.intensity, rel=1e-4)
         assert one.diameter_deg == pytest.approx(other.diameter_deg, rel=1e-4)
     assert kept.lights[0].intensity != pytest.approx(lit.lights[0].intensity, rel=0.1)
+
+
+def test_a_lens_that_makes_no_image_keeps_the_lights_until_it_is_repaired(lit):
+    lens = load_lens("heliar-tronnier")
+    flat = tuple(row.replace(curvature=0.0) if isinstance(row, Surface) else row for row in lens.rows)
+    broken = lit.replace(lens=lens.replace(rows=flat))
+    assert kept_on_plate(lit, broken) == broken
+    assert kept_on_plate(broken, lit) == lit
 
 
 def test_a_path_and_an_intensity_over_time_stay_on_the_plate_too(lit):

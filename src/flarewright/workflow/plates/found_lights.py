@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from ...errors import ProjectError
+from ...errors import FlarewrightError, ProjectError
 from ...io.files.sentences import count, validation_sentences
 from ...jobs.frame_list import FramePattern
 from ...model import Backplate, Light, LightCurve, LightKey, Project
@@ -235,8 +235,8 @@ def kept_on_plate(before: Project, after: Project) -> Project:
     Parameters
     ----------
     before, after : Project
-        Before and after a change. Projects without a plate's lights, or whose lens is the same, are returned as they
-        are.
+        Before and after a change. Projects without a plate's lights, whose lens is the same, or makes no image, are
+        returned as they are.
 
     Returns
     -------
@@ -256,7 +256,11 @@ def kept_on_plate(before: Project, after: Project) -> Project:
     if not lit or len(before.lights) != len(after.lights) or same_optics(before, after):
         return after
     check_plate(after, before.camera.size_px)
-    moved = _Moved(before, after)
+    try:
+        moved = _Moved(before, after)
+    except FlarewrightError:
+        # a lens that makes no image, until it is repaired
+        return after
     lights = tuple(moved.light(old, new) for old, new in zip(before.lights, after.lights, strict=True))
     found: Project = after.replace(lights=lights)
     return found
