@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import FileError, ProjectError
 from ...io.files.door import shown
-from ...io.images.plate_picture import PlatePicture, read_plate
+from ...io.images.plate_picture import PlatePicture
 from ...model import Backplate, PlateSearch
 from ...typing import Pixels
 from .picture import DrawnPicture
@@ -57,8 +57,8 @@ def plate_for(plate: Backplate | None, size_px: tuple[int, int]) -> ShownPlate |
 
 @lru_cache(maxsize=6)
 def _shown(plate: Backplate, changed_ns: int, size_px: tuple[int, int]) -> ShownPlate:
-    picture = _read(plate.image, plate.layer, plate.transfer, changed_ns)
-    # imports SciPy, which the editor does not need without a plate
+    del changed_ns
+    picture = _read(plate)
     from ...plates.measured_plate import converted
 
     pixels = _filled(converted(picture, "rec709"), size_px)
@@ -72,14 +72,14 @@ def _shown(plate: Backplate, changed_ns: int, size_px: tuple[int, int]) -> Shown
     return ShownPlate(pixels, _filled(lamps[..., None], size_px)[..., 0], too_dark)
 
 
-@lru_cache(maxsize=1)
-def _read(path: str, layer: str | None, transfer: str | None, changed_ns: int) -> PlatePicture:
-    """Read a plate; the last one is kept, for pictures of another size."""
-    del changed_ns
+def _read(plate: Backplate) -> PlatePicture:
+    # imports SciPy, which the editor does not need without a plate
+    from ...workflow.plates.found_lights import backplate_picture
+
     try:
-        return read_plate(path, layer=layer, transfer=transfer)  # type: ignore[arg-type]
+        return backplate_picture(plate)
     except FileError as error:
-        raise ProjectError(str(error).replace(shown(Path(path)), Path(path).name)) from None
+        raise ProjectError(str(error).replace(shown(Path(plate.image)), Path(plate.image).name)) from None
 
 
 def _filled(linear: Pixels, size_px: tuple[int, int]) -> Pixels:

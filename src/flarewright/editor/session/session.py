@@ -13,8 +13,7 @@ from pydantic import ValidationError
 
 from ...errors import FlarewrightError, ProjectError
 from ...io.files.door import expanded
-from ...io.images.plate_picture import read_plate
-from ...model import Project
+from ...model import Backplate, Project
 from ..commands.lens import table_of
 from ..commands.registry import done
 from ..common.messages import sentence
@@ -190,8 +189,10 @@ class Session:
         place = expanded(text.strip())
         if place.suffix.lower() in PICTURES:
             self.reach.check(place)
+            from ...workflow.plates.found_lights import backplate_picture
+
             # a large file is read before the session is locked
-            read_plate(place)
+            backplate_picture(Backplate(image=str(place.resolve())))
             self.do("set_plate", {"values": {"image": str(place.resolve())}})
             return
         with self.lock:

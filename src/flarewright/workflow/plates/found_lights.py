@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from ...errors import FlarewrightError, ProjectError
 from ...io.files.sentences import count, validation_sentences
+from ...io.images.plate_picture import PlatePicture
 from ...jobs.frame_list import FramePattern
 from ...model import Backplate, Light, LightCurve, LightKey, Project
 from ...model.project.backplate import found_in_plate
@@ -27,6 +28,7 @@ from .plate_sources import PlateShot, plate_picture, plate_shot
 
 __all__ = [
     "FoundLights",
+    "backplate_picture",
     "backplate_shot",
     "kept_on_plate",
     "plate_settings_of",
@@ -71,9 +73,25 @@ def plate_settings_of(plate: Backplate) -> PlateSettings:
     ProjectError
         They contradict each other, or the file's name stands for a sequence.
     """
+    _check_single(plate)
+    return PlateSettings(plate.image, **search_values(plate))
+
+
+def _check_single(plate: Backplate) -> None:
     if FramePattern(plate.image).numbered:
         raise ProjectError(f"{plate.image} stands for a sequence; give the file of one frame")
-    return PlateSettings(plate.image, **search_values(plate))
+
+
+def backplate_picture(plate: Backplate) -> PlatePicture:
+    """Read the plate of a project; the last one is kept, for the search and the comp too.
+
+    Raises
+    ------
+    FlarewrightError
+        It cannot be read, or its name stands for a sequence.
+    """
+    _check_single(plate)
+    return plate_picture(PlateSettings(plate.image, layer=plate.layer, transfer=plate.transfer), _FRAME)
 
 
 def search_values(plate: Backplate) -> dict[str, Any]:
