@@ -536,9 +536,7 @@ function hear(event) {
     if (event.grade === 'working') app.view.refreshTarget();
   }
   if (event.type === 'finding') {
-    const ended = state.finding.running && !event.running;
     state.finding = event;
-    if (ended) panels.light.searched();
     panels.light.update(state);
     app.view.redraw();
     return;

@@ -56,7 +56,7 @@ export function plateGroup(app) {
   ];
   const further = h('details', {}, h('summary', {}, 'More'), ...more.map((one) => one.element));
   const find = button('Find lights', async () => { if (await app.ask('api/plate/find')) { outlines = false; app.view.redraw(); } }, { id: 'find-lights', kind: 'main', tip: 'Makes the bright areas of the plate the lights of the project, as one step of the history: their flare has the unit of the plate, and sits in it. Found lights can be moved, changed and removed.' });
-  const cancel = button('Cancel', async () => { try { app.take(await app.postNow('api/plate/stop')); } catch (error) { complain(error); } }, { id: 'find-cancel' });
+  const cancel = button('Cancel', async () => { outlines = true; try { app.take(await app.postNow('api/plate/stop')); } catch (error) { complain(error); } }, { id: 'find-cancel' });
   const bar = h('i');
   const meter = h('span', { class: 'bar' }, bar);
   const words = h('p', { class: 'quietly', id: 'plate-words' });
@@ -66,7 +66,7 @@ export function plateGroup(app) {
     find.hidden = run.running;
     cancel.hidden = meter.hidden = !run.running;
     bar.style.width = `${100 * run.part}%`;
-    if (run.running) words.textContent = `${run.words}…`;
+    if (run.running) words.textContent = `${run.words.charAt(0).toUpperCase()}${run.words.slice(1)}…`;
     else if (outlines && s.plate && found.key === keyOf(s)) words.textContent = `${found.lights.length ? `${found.lights.length} light${found.lights.length > 1 ? 's' : ''} outlined${s.plate.lit ? ', those of the next search' : ''}. ` : ''}${found.words ? sentence(found.words) : ''}`;
     else words.textContent = s.plate?.lit ? 'The lights are those of the plate; the flare has its unit. Another f-number or lens keeps them in place.' : '';
   }
@@ -84,7 +84,5 @@ export function plateGroup(app) {
     },
     // Whether the panel is open: outlines are shown with it.
     open(on) { shown = on; if (on && app.state) look(); app.view.redraw(); },
-    // A search ended or another plate came.
-    found(on) { outlines = on; },
   });
 }

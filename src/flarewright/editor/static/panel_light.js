@@ -91,7 +91,6 @@ export function lightPanel(app) {
       for (const part of rectangle) part.element.hidden ||= !sides(state);
     },
     open: (on) => plate.open(on),
-    searched: () => plate.found(false),
     moved(angles) {
       across.element.querySelector('input').value = angles[0].toFixed(2);
       up.element.querySelector('input').value = angles[1].toFixed(2);
