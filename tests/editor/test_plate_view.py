@@ -93,13 +93,21 @@ def test_a_drag_of_one_light_of_many_shows_all(shot, monkeypatch):
     draw = drag._pixels
     monkeypatch.setattr(drag, "_adapt_size", lambda seconds: None)
     drag._pixels = lambda picture: drawn.append(picture) or draw(picture)
+    # the others are drawn before the drag begins, and once
+    drag.prepare()
+    take, taken = render_picture.take, []
+    monkeypatch.setattr(render_picture, "take", lambda *a, **k: taken.append(len(a[0].lights)) or take(*a, **k))
+    drag._dragged = 1
+    drag.prepare()
+    assert taken.count(2) == 1
     for x in (2.0, 1.0):
         moved = drag.picture(lambda project, x=x: move_light(project, 1, x, -3.0), session.revision)
-        wanted = render_picture.take(moved.project, "moving", View())
+        wanted = take(moved.project, "moving", View())
         light, both = drawn[-1].ghosts, wanted.ghosts
         # which faint ghosts are drawn at half the resolution depends on the lights of a picture
         assert np.abs(light - both).mean() < 0.01 * both.mean()
         assert light.sum() == pytest.approx(both.sum(), rel=1e-3)
+    assert taken.count(2) == 1
     # three area lights are points in quick pictures, and discs in the final one
     assert all(light.diameter_deg == 0.0 for light in render_picture.staged(many, "moving").lights)
     assert all(light.diameter_deg == 0.4 for light in render_picture.staged(many, "final").lights)

@@ -18,6 +18,7 @@ from ...model import Project
 from ...render.image.display import view_sum
 from ...render.preview.drag_preview import DragPicture, StarburstCanvas, moving_picture
 from ..commands.design_targets import target_project
+from ..commands.shot import move_light
 from ..session.view_settings import View
 from . import render_picture
 from .display_image import jpeg
@@ -79,6 +80,8 @@ class Drag:
         self._target_sheets: tuple[StarburstCanvas, ...] = ()
         # the light of all lights but the dragged one, with what determines it
         self._others: tuple[Any, DrawnPicture] | None = None
+        # the light of the last such drag, which is likely to be dragged again
+        self._dragged = 0
 
     def picture(self, moved: Callable[[Project], Project], revision: int) -> Moved | None:
         """Draw the project in the state of the drag.
@@ -158,7 +161,11 @@ class Drag:
             # a mask takes seconds, which would delay other requests for a drag that may never come
             return
         with self._one, suppress(FlarewrightError):
-            self._drawn(project, self.screen.session.view)
+            k = min(self._dragged, len(project.lights) - 1)
+            x, y = project.lights[k].field_deg
+            nudged = move_light(project, k, x + 1e-3, y)
+            if self._one_moved(project, nudged, self.screen.session.view) is None:
+                self._drawn(project, self.screen.session.view)
 
     def _one_moved(self, before: Project, project: Project, view: View) -> DrawnPicture | None:
         """Draw the one light of many that moves, and add the others, which are drawn once; None if it is no such drag.
@@ -172,13 +179,15 @@ class Drag:
         if len(moving) != 1:
             return None
         (k,) = moving
+        self._dragged = k
         scale, levels = SCALES[self._scale], levels_at(self.screen.match, project)
-        others = project.replace(lights=(*project.lights[:k], *project.lights[k + 1 :]))
+        quick = render_picture.pointlike(project)
+        others = project.replace(lights=(*quick.lights[:k], *quick.lights[k + 1 :]))
         key = (render_picture.pictured(others), scale, levels)
         if self._others is None or self._others[0] != key:
             self._others = key, render_picture.take(others, "moving", view, scale=scale, levels=levels)
         rest = self._others[1]
-        alone = project.replace(lights=(project.lights[k],))
+        alone = project.replace(lights=(quick.lights[k],))
         still = moving_picture(render_picture.moving_stage(alone, scale, levels), self._sheets)
         if still is None:
             one = render_picture.take(alone, "moving", view, scale=scale, levels=levels)

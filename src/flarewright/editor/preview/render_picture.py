@@ -96,7 +96,7 @@ def staged(
     size = view_size(project, scale) if room is None else rest_size(project, room)
     camera = project.camera.replace(size_px=size, sensor_mm=project.camera.sensor)
     if hasty or grade in ("moving", "draft"):
-        project = _pointlike(project)
+        project = pointlike(project)
     own = project.quality
     if grade in ("soon", "final"):
         # reference quality is for files: it never finishes
@@ -114,7 +114,7 @@ def staged(
     return found
 
 
-def _pointlike(project: Project) -> Project:
+def pointlike(project: Project) -> Project:
     """Return a project without area lights, if it has many: the blur of their ghosts takes most of the time."""
     wide = [light.diameter_deg > 0.0 or light.shape is not None for light in project.lights]
     if sum(wide) <= MOST_WIDE_LIGHTS:
@@ -194,7 +194,7 @@ def take(
     scattered = [layer for layer in parts if not layer.name.startswith(("ghosts", "starburst"))]
     haze = spread_layers(scattered, size) if scattered else None
     reported = rendering.remarks
-    if hasty and _pointlike(project) is not project:
+    if hasty and pointlike(project) is not project:
         reported = (*reported, POINTS)
     if grade == "final" and _slow_rings(stage.replace(quality=project.quality)):
         reported = (*reported, NO_RINGS)
