@@ -108,8 +108,10 @@ class Drag:
                 return None
             started = time.perf_counter()
             project = moved(session.project)
-            drawn = self._one_moved(session.project, project, session.view) or self._drawn(project, session.view)
-            self._adapt_size(time.perf_counter() - started)
+            one = self._one_moved(session.project, project, session.view)
+            drawn = one or self._drawn(project, session.view)
+            # the other lights are drawn once, which says nothing of the next picture
+            self._adapt_size(one.seconds if one is not None else time.perf_counter() - started)
             if revision != session.revision:
                 # the drag has ended meanwhile; leave all time to the final picture
                 return None
@@ -187,6 +189,7 @@ class Drag:
         if self._others is None or self._others[0] != key:
             self._others = key, render_picture.take(others, "moving", view, scale=scale, levels=levels)
         rest = self._others[1]
+        started = time.perf_counter()
         alone = project.replace(lights=(quick.lights[k],))
         still = moving_picture(render_picture.moving_stage(alone, scale, levels), self._sheets)
         if still is None:
@@ -195,10 +198,9 @@ class Drag:
             self._sheets = still.sheets
             one = DrawnPicture(alone, "moving", still.ghosts, still.rest, 0.0)
         haze = [each.haze for each in (one, rest) if each.haze is not None]
-        return DrawnPicture(
-            project, "moving", one.ghosts + rest.ghosts, one.rest + rest.rest, one.seconds, one.remarks,
-            haze=sum(haze[1:], haze[0]) if haze else None,
-        )  # fmt: skip
+        whole = sum(haze[1:], haze[0]) if haze else None
+        ghosts, light = one.ghosts + rest.ghosts, one.rest + rest.rest
+        return DrawnPicture(project, "moving", ghosts, light, time.perf_counter() - started, one.remarks, haze=whole)
 
     def _drawn(self, project: Project, view: View) -> DrawnPicture | DragPicture:
         scale, levels = SCALES[self._scale], levels_at(self.screen.match, project)
