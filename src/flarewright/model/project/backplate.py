@@ -62,8 +62,8 @@ class Backplate(Frozen):
         Path of the picture (EXR, TIFF, PNG, JPEG or WebP).
     layer : str or None
         Layer of an EXR file.
-    transfer : {"srgb", "linear"} or None
-        How codes are read; None: srgb for whole numbers, linear for floating-point numbers.
+    transfer : str or None
+        How codes are read, as `--plate-transfer`; None: srgb for whole numbers, linear for floating-point numbers.
     lights_above : float or None
         Luminance above which pixels of the plate are the project's lights: layers then have the unit of the plate.
         None: the lights are not those of the plate.
@@ -72,7 +72,7 @@ class Backplate(Frozen):
 
     image: str = Field(min_length=1, max_length=4096)
     layer: str | None = None
-    transfer: Literal["srgb", "linear"] | None = None
+    transfer: Literal["srgb", "linear", "rec709", "gamma22", "gamma28", "pq", "hlg"] | None = None
     lights_above: float | None = Field(None, gt=0.0, le=1e30)
     search: PlateSearch = PlateSearch()
 

@@ -23,8 +23,9 @@ from ...plates.settings import PlateSettings, parse_source
 from ...plates.tracking import follow
 from ...render.scene.pixel_place import field_angles_at, image_px
 from ...typing import Progress
+from .plate_files import plate_picture
 from .plate_frame import bare_text, check_plate, images_of, plate_images, plate_optics, same_optics
-from .plate_sources import PlateShot, plate_picture, plate_shot
+from .plate_sources import PlateShot, plate_shot
 
 __all__ = [
     "FoundLights",
