@@ -31,6 +31,7 @@ from flarewright.io.images.exr import read_exr
 from flarewright.kernels.jit import decorators, warmup, warmup_processes
 from flarewright.kernels.jit.roots import divide_roots, drawing_roots, roots, tracing_roots
 from flarewright.kernels.jit.warmup import compile_together
+from flarewright.render.scattering import scatter_pass
 
 
 @pytest.fixture(autouse=True)
@@ -132,8 +133,8 @@ def watched_here(monkeypatch):
     monkeypatch.setattr("flarewright.render.warmup.compile_together", lambda names, *_: planned.update(names))
     monkeypatch.setattr("flarewright.cli.app.head_start", lambda rings: nullcontext())
     # few sample points of the scatter pass: the number does not change which kernels are called
-    for name in ("RINGS", "SPOKES", "FAN"):
-        monkeypatch.setattr(f"flarewright.render.scattering.scatter_pass.{name}", 6)
+    for name in ("FINE", "COARSE"):
+        monkeypatch.setattr(scatter_pass, name, scatter_pass.Sampling(rays=6, rings=6, spokes=6, fan=6))
 
     def command(*words):
         assert run(list(map(str, words))) == 0

@@ -9,7 +9,9 @@ from PIL import Image
 pytest.importorskip("playwright", reason="the extra e2e is not installed")
 pytest.importorskip("starlette", reason="the extra ui is not installed")
 
-from chromium import chromium, drop
+from chromium import chromium, download, drop
+
+from flarewright.io.images.exr import read_exr
 
 pytestmark = [
     pytest.mark.browser,
@@ -36,7 +38,7 @@ def handles(tab):
     return sorted(((x - frame["x"]) / frame["w"] * SIZE[0], (y - frame["y"]) / frame["h"] * SIZE[1]) for x, y in places)
 
 
-def test_lights_of_a_dropped_photograph_are_found_dragged_and_undone(tab):
+def test_lights_of_a_dropped_photograph_are_found_dragged_and_undone(tab, tmp_path):
     drop(tab, "night.png", night())
     # outlines come by themselves
     tab.until("flarewright.plateLights()?.lights.length === 3")
@@ -59,6 +61,14 @@ def test_lights_of_a_dropped_photograph_are_found_dragged_and_undone(tab):
     for x, y in LAMPS:
         assert shown[round(y / SIZE[1] * high), round(x / SIZE[0] * wide)].min() > 200
     assert np.median(shown) < 30
+
+    # the exported comp holds the plate's linear values; near the lamps the flare is added to them
+    [comp] = read_exr(download(tab, "Comp as EXR", tmp_path / "night.comp.exr")).layers
+    assert comp.pixels.shape == (SIZE[1], SIZE[0], 3)
+    dark = 8 / 255 / 12.92
+    assert np.median(comp.pixels) == pytest.approx(dark, rel=0.02)
+    assert comp.pixels.min() >= dark * 0.999
+    assert comp.pixels.max() == pytest.approx(1.0, rel=0.1)
 
     # a brighter lamp has a visible flare
     def level():
