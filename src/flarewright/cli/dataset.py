@@ -50,6 +50,10 @@ def dataset(
     chunk: Annotated[
         str | None, typer.Option(metavar="I/N", help="Draw part I of N of the items, for render farms.")
     ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(metavar="WHERE", help="Draw on a Dask cluster: local:N, tcp://HOST:PORT or slurm:FILE."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print a summary as one JSON object.")] = False,
 ) -> None:
     """Draw training pairs for the removal and the detection of lens flare, from distributions in a file.
@@ -59,7 +63,8 @@ def dataset(
     """
     if example:
         others: dict[str, object] = {"SPEC.toml": spec, "-o": output, "-n": items, "--seed": seed, "--preview": preview}
-        others |= {"--processes": processes, "--threads": threads, "--chunk": chunk, "--json": as_json or None}
+        others |= {"--processes": processes, "--threads": threads, "--chunk": chunk, "--cluster": cluster}
+        others |= {"--json": as_json or None}
         _print_example(others)
         return
     if spec is None:
@@ -70,7 +75,8 @@ def dataset(
     settings = _settings(spec, seed)
     started = time.monotonic()
     if preview is not None:
-        if idle := [name for name, value in (("--chunk", chunk), ("--processes", processes)) if value is not None]:
+        others = {"--chunk": chunk, "--processes": processes, "--cluster": cluster}
+        if idle := [name for name, value in others.items() if value is not None]:
             raise ProjectError(f"{idle[0]} has no effect on a contact sheet; leave it out")
         _preview(settings, preview, spec, items, threads, as_json)
         return
@@ -87,6 +93,8 @@ def dataset(
             threads=threads,
             report=report,
             prepare=_compile,
+            cluster=cluster,
+            announce=lambda line: print_remarks([line]),
         )
     print_remarks(result.remarks)
     seconds = time.monotonic() - started

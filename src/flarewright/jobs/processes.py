@@ -4,16 +4,28 @@ from __future__ import annotations
 
 import pickle
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from threading import Lock, Thread
-from typing import Any
+from typing import Any, NoReturn, Protocol
 
 from ..errors import FlarewrightError
 from ..kernels.jit.warmup_processes import cores, start_python
+from .answers import Done, result_of
 from .worker import named
+
+__all__ = [
+    "Done",
+    "Executor",
+    "end_processes",
+    "fitting",
+    "how_it_ended",
+    "next_answer",
+    "shares",
+    "start_process",
+    "work_off",
+]
 
 # time that a process gets to write its present result when it has to end
 _PATIENCE_S = 10.0
@@ -21,19 +33,14 @@ _PATIENCE_S = 10.0
 _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-@dataclass(frozen=True)
-class Done:
-    """A finished item.
+class Executor(Protocol):
+    """What works off items instead of processes of this machine: `cluster.executor.Cluster`."""
 
-    Attributes
-    ----------
-    item : object
-    result : object
-        What the function returned.
-    """
-
-    item: Any
-    result: Any
+    def work_off(
+        self, function: str, context: Any, items: Sequence[Any], *, processes: int, threads: int | None, what: str
+    ) -> Iterator[Done]:
+        """Parameters and errors as of `processes.work_off`."""
+        ...
 
 
 def shares(items: int, processes: int | None = None, threads: int | None = None) -> tuple[int, int]:
@@ -84,6 +91,7 @@ def work_off(
     processes: int = 1,
     threads: int | None = None,
     what: str = "item",
+    executor: Executor | None = None,
 ) -> Iterator[Done]:
     """Call a function for each item, and yield the results as they come.
 
@@ -102,6 +110,8 @@ def work_off(
         Threads of each process; None: all cores.
     what : str
         What an item is, for messages.
+    executor : Executor, optional
+        Works off the items instead; None: processes of this machine.
 
     Yields
     ------
@@ -117,6 +127,9 @@ def work_off(
     RuntimeError
         Any other exception of the function, with its traceback.
     """
+    if executor is not None:
+        yield from executor.work_off(function, context, items, processes=processes, threads=threads, what=what)
+        return
     if processes == 1:
         call = named(function)
         for item in items:
@@ -128,18 +141,33 @@ def work_off(
     started: list[subprocess.Popen[bytes]] = []
     try:
         for _ in range(min(processes, len(items))):
-            process = _start(threads)
+            process = start_process(f"from {__package__}.worker import serve; serve()", threads)
             started.append(process)
             Thread(target=_attend, args=(process, first, todo, lock, answers), daemon=True).start()
         for _ in items:
-            item, answer = _next(answers)
-            yield Done(item, _result(item, answer, what))
+            item, answer = next_answer(answers)
+            if answer[0] == "lost":
+                _raise_lost(answer[1], item, what)
+            yield Done(item, result_of(item, answer, what))
     finally:
-        _end(started)
+        end_processes(started)
 
 
-def _start(threads: int | None) -> subprocess.Popen[bytes]:
-    code = f"from {__package__}.worker import serve; serve()"
+def start_process(code: str, threads: int | None) -> subprocess.Popen[bytes]:
+    """Start an interpreter with a pipe to its stdin and from its stdout.
+
+    Parameters
+    ----------
+    code : str
+        Statements.
+    threads : int, optional
+        Threads of its libraries; None: as they choose.
+
+    Raises
+    ------
+    FlarewrightError
+        No process can be started.
+    """
     number = {} if threads is None else dict.fromkeys(_THREADS, str(threads))
     try:
         return start_python(code, stdout=subprocess.PIPE, environment=number)
@@ -173,37 +201,39 @@ def _attend(
         answers.put((item, ("lost", process)))
 
 
-def _next(answers: SimpleQueue[tuple[Any, tuple[Any, ...]]]) -> tuple[Any, tuple[Any, ...]]:
-    """Wait for an answer; with pauses, because some systems deliver Ctrl-C only between calls."""
+def next_answer(answers: SimpleQueue[Any], watch: Callable[[], None] | None = None) -> Any:
+    """Wait for an answer; with pauses, because some systems deliver Ctrl-C only between calls.
+
+    Parameters
+    ----------
+    answers : SimpleQueue
+    watch : callable, optional
+        Called in each pause.
+    """
     while True:
         with suppress(Empty):
             return answers.get(timeout=0.5)
+        if watch is not None:
+            watch()
 
 
-def _result(item: Any, answer: tuple[Any, ...], what: str) -> Any:
-    """Return the result in an answer, or raise its error."""
-    match answer:
-        case ("done", result):
-            return result
-        case ("refused", sentence, problems):
-            raise FlarewrightError(sentence, problems)
-        case ("memory",):
-            raise MemoryError
-        case ("lost", process):
-            with suppress(subprocess.TimeoutExpired):
-                process.wait(1.0)
-            code = process.returncode
-            how = f"by signal {-code}" if code is not None and code < 0 else f"with exit code {code}"
-            where = "before its first work" if item is None else f"at {what} {item}"
-            raise FlarewrightError(
-                f"a process ended {how} {where}, perhaps for lack of memory; finished work is kept: repeat the "
-                "command, with fewer --processes"
-            )
-        case _:
-            raise RuntimeError(f"{what} {item}: {answer[-1]}")
+def _raise_lost(process: subprocess.Popen[bytes], item: Any, what: str) -> NoReturn:
+    where = "before its first work" if item is None else f"at {what} {item}"
+    raise FlarewrightError(
+        f"a process ended {how_it_ended(process)} {where}, perhaps for lack of memory; finished work is kept: repeat "
+        "the command, with fewer --processes"
+    )
 
 
-def _end(started: Sequence[subprocess.Popen[bytes]]) -> None:
+def how_it_ended(process: subprocess.Popen[bytes]) -> str:
+    """Return the end of a lost process in words: "by signal 9", "with exit code 1"."""
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(1.0)
+    code = process.returncode
+    return f"by signal {-code}" if code is not None and code < 0 else f"with exit code {code}"
+
+
+def end_processes(started: Sequence[subprocess.Popen[bytes]]) -> None:
     """End processes: closing their stdin lets each finish what it writes."""
     for process in started:
         with suppress(OSError):

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from ..errors import FlarewrightError, OutputError, ProjectError
+from ..jobs.cluster.executor import open_cluster, workers_of
 from ..jobs.frame_list import FramePattern, chunk_of, frames_text, parse_chunk, parse_frames
 from ..jobs.processes import fitting, shares, work_off
 from ..model import Project
@@ -17,6 +18,7 @@ from .frame_files import holdout_files
 from .keyframes import frame_rate, is_still, length_s, time_of
 
 if TYPE_CHECKING:
+    from ..jobs.cluster.executor import Cluster
     from ..plates.settings import PlateSettings
     from .films.assembly import FilmResult
     from .films.look import FilmView
@@ -45,6 +47,7 @@ class ShotResult:
     remarks : tuple of str
         About the shot and its frames, each once.
     processes : int
+        Those that drew, or the workers of a cluster.
     plate : PlateShot or None
         The sources of the plate, if there is one.
     movie : FilmResult or None
@@ -78,6 +81,8 @@ def shot(
     movie_view: FilmView | None = None,
     movie_exposure: float | None = None,
     encoded: Callable[[int, int, int], None] | None = None,
+    cluster: str | None = None,
+    announce: Callable[[str], None] | None = None,
 ) -> ShotResult:
     """Draw frames of a project whose values change over time, and write a file for each.
 
@@ -126,6 +131,11 @@ def shot(
         `view` and `exposure_stops` of `films.assembly.assemble_film`.
     encoded : callable, optional
         Called after each frame of the film, as `searched`.
+    cluster : str, optional
+        Workers of a Dask cluster draw: "local:4", "tcp://HOST:PORT" or "slurm:FILE" (docs/many-machines.md). None:
+        processes of this machine.
+    announce : callable, optional
+        Called with sentences about the cluster as they arise.
 
     Returns
     -------
@@ -134,7 +144,8 @@ def shot(
     Raises
     ------
     FlarewrightError
-        The frames, the file name or the project cannot be used, a file cannot be written, or a process was lost.
+        The frames, the file name or the project cannot be used, a file cannot be written, a process was lost, or there
+        is no such cluster.
     MemoryError
         There is too little memory for a frame.
 
@@ -146,9 +157,10 @@ def shot(
     >>> moving = Project(lens="heliar-tronnier", lights=[Light(field_deg=(0, 4), keyframes=path)])
     >>> shot(moving, "flare.####.exr", frames="1-25", shutter_deg=180)               # doctest: +SKIP
     """
-    from .shot_frame import ShotPlan, frame_project
+    from .shot_frame import ShotPlan
 
     _check(shutter_deg, subframes)
+    processes = workers_of(cluster, processes, threads)
     if plate is not None:
         plate = replace(plate, first=project.timeline.start)
         from .plates.found_lights import without_found_lights
@@ -167,30 +179,20 @@ def shot(
     mine = numbers if chunk is None else chunk_of(numbers, *parse_chunk(chunk))
     if shutter_deg == 0.0 and subframes is not None and subframes > 1:
         remarks.append("sub-frames have no effect without an open shutter: give its angle, such as 180 degrees")
-    found = None
-    if plate is not None:
-        found = _searched(project, plate, numbers, pattern, comp, processes, threads, searched)
-    elif comp:
-        found = _own_plate(project)
-    if found is not None:
-        remarks += found.remarks
-    _check_sequences(project, mine)
-    plan = ShotPlan(project, pattern.text, shutter_deg, subframes, parts, cropped, found, comp)
-    if not mine:
-        return ShotResult((), (*remarks, f"chunk {chunk} of {len(numbers)} frames is empty"), 0, found)
-    _check_moments(plan, mine)
-    if processes is None:
-        processes = fitting(_process_bytes(plan), threads)
-    number, each = shares(len(mine), processes, threads)
-    if prepare is not None:
-        for frame in {mine[0], mine[len(mine) // 2], mine[-1]}:
-            prepare(frame_project(plan, time_of(frame, project.timeline)), number * each)
-    done: list[FrameResult] = []
-    for one in work_off(_DRAW, plan, mine, processes=number, threads=each, what="frame"):
-        done.append(one.result)
-        if report is not None:
-            report(one.result, len(done), len(mine))
-    done.sort(key=lambda result: result.frame)
+    with open_cluster(cluster, Path(pattern.text).parent, announce) as executor:
+        found = None
+        if plate is not None:
+            found = _searched(project, plate, numbers, pattern, comp, processes, threads, searched, executor)
+        elif comp:
+            found = _own_plate(project)
+        if found is not None:
+            remarks += found.remarks
+        _check_sequences(project, mine)
+        plan = ShotPlan(project, pattern.text, shutter_deg, subframes, parts, cropped, found, comp)
+        if not mine:
+            return ShotResult((), (*remarks, f"chunk {chunk} of {len(numbers)} frames is empty"), 0, found)
+        _check_moments(plan, mine)
+        done, number = _drawn(plan, mine, processes, threads, executor, report, prepare)
     film = None
     if movie is not None:
         from .films.assembly import assemble_film
@@ -201,6 +203,35 @@ def shot(
         )  # fmt: skip
         remarks += film.remarks
     return ShotResult(tuple(done), (*remarks, *_remarks(done)), number, found, film)
+
+
+def _drawn(
+    plan: ShotPlan,
+    frames: Sequence[int],
+    processes: int | None,
+    threads: int | None,
+    executor: Cluster | None,
+    report: Callable[[FrameResult, int, int], None] | None,
+    prepare: Callable[[Project, int], None] | None,
+) -> tuple[list[FrameResult], int]:
+    """Draw frames; return their results in the order of their numbers, and the number of processes."""
+    from .shot_frame import frame_project
+
+    timeline = plan.project.timeline
+    if processes is None:
+        processes = fitting(_process_bytes(plan), threads)
+    number, each = shares(len(frames), processes, threads)
+    # other machines have their own compiled kernels
+    if prepare is not None and (executor is None or executor.local):
+        for frame in {frames[0], frames[len(frames) // 2], frames[-1]}:
+            prepare(frame_project(plan, time_of(frame, timeline)), number * each)
+    done: list[FrameResult] = []
+    for one in work_off(_DRAW, plan, frames, processes=number, threads=each, what="frame", executor=executor):
+        done.append(one.result)
+        if report is not None:
+            report(one.result, len(done), len(frames))
+    done.sort(key=lambda result: result.frame)
+    return done, number if executor is None else executor.workers
 
 
 def _own_plate(project: Project) -> PlateShot:
@@ -267,6 +298,7 @@ def _searched(
     processes: int | None,
     threads: int | None,
     report: Callable[[int, int, int], None] | None,
+    executor: Cluster | None,
 ) -> PlateShot:
     """Find the sources of the plate in all frames of the shot, whichever of them this process draws."""
     from ..kernels.jit.warmup_processes import cores
@@ -279,7 +311,12 @@ def _searched(
     if comp:
         check_comp(project, size_px)
     return plate_shot(
-        plate, frames, kept=sources_file(output.text), processes=processes or threads or cores(), report=report
+        plate,
+        frames,
+        kept=sources_file(output.text),
+        processes=processes or threads or cores(),
+        report=report,
+        executor=executor,
     )
 
 

@@ -29,6 +29,7 @@ EPILOG = (
     "Examples:\n\nflarewright shot --project drive.toml -o flare.####.exr\n\n"
     "flarewright shot --project drive.toml --frames 1001-1240 --start 1001 --fps 25 --shutter 180 -o flare.%04d.exr\n\n"
     "flarewright shot --project drive.toml --chunk 2/5 -o flare.####.exr\n\n"
+    "flarewright shot --project drive.toml --cluster tcp://10.0.0.1:8786 -o flare.####.exr\n\n"
     "flarewright shot plate.####.exr --lens canon-28-80 --fstop 4 -o flare.####.exr --over comp.####.exr\n\n"
     "flarewright shot drive.mp4 --lens canon-28-80 -o flare.####.exr --over comp.####.exr --movie comp.mp4"
 )
@@ -71,6 +72,8 @@ def shot(options: ShotOptions) -> None:
             movie_view=options.view,  # type: ignore[arg-type]
             movie_exposure=options.exposure,
             encoded=encoded,
+            cluster=options.cluster,
+            announce=lambda line: print_remarks([line]),
         )
     remarks = [*remarks, *result.remarks]
     print_remarks(remarks)

@@ -22,7 +22,7 @@ from ...io.files.door import outside_arrays
 from ...io.files.text_file import digest_of
 from ...io.images.plate_picture import PlatePicture
 from ...jobs.frame_list import FramePattern, frames_text
-from ...jobs.processes import shares, work_off
+from ...jobs.processes import Executor, shares, work_off
 from ...plates.detection import LUMINANCE, Sources, find_sources, mean_luminance
 from ...plates.joining import joined
 from ...plates.lights import PlateTracks, plate_tracks
@@ -146,6 +146,7 @@ def plate_shot(
     kept: Path | None = None,
     processes: int = 1,
     report: Callable[[int, int, int], None] | None = None,
+    executor: Executor | None = None,
 ) -> PlateShot:
     """Find and follow the sources of a plate.
 
@@ -159,6 +160,8 @@ def plate_shot(
     processes : int
     report : callable, optional
         Called with the frame, the number of searched frames and the number of all.
+    executor : Executor, optional
+        Searches instead of processes of this machine.
 
     Returns
     -------
@@ -174,7 +177,7 @@ def plate_shot(
     threshold, remarks = _threshold(settings, frames[:1] if still else frames, first)
     search = _Search(settings, threshold, first.size_px)
     # one picture for all frames is searched once
-    searched = _searched(search, frames[:1] if still else frames, kept, processes, report)
+    searched = _searched(search, frames[:1] if still else frames, kept, processes, report, executor)
     found = [Sources.from_table(searched[frames[0] if still else frame]) for frame in frames]
     if not any(len(each) for each in found):
         raise ProjectError(
@@ -248,6 +251,7 @@ def _searched(
     kept: Path | None,
     processes: int,
     report: Callable[[int, int, int], None] | None,
+    executor: Executor | None,
 ) -> dict[int, Floats]:
     """Return the sources of each frame, those in the file `kept` or new ones."""
     made_of = {frame: _made_of(search, frame) for frame in frames}
@@ -260,7 +264,7 @@ def _searched(
         _check_ours(kept)
     saved = time.monotonic()
     try:
-        for one in work_off(_FIND, search, todo, processes=number, threads=each, what="frame"):
+        for one in work_off(_FIND, search, todo, processes=number, threads=each, what="frame", executor=executor):
             table, frame = one.result
             found[frame] = table
             if report is not None:

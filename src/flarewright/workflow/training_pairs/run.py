@@ -18,6 +18,7 @@ from ...io.files.tar_members import join_parts
 from ...io.files.text_file import digest_of, read_bytes, read_json
 from ...io.project.dataset_file import contradictions, read_dataset_spec
 from ...io.project.named_files import picture_files
+from ...jobs.cluster.executor import open_cluster, workers_of
 from ...jobs.frame_list import chunk_of, parse_chunk
 from ...jobs.processes import fitting, shares, work_off
 from ...model import Project
@@ -82,6 +83,8 @@ def dataset(
     threads: int | None = None,
     report: Callable[[ItemResult, int, int], None] | None = None,
     prepare: Callable[[Project, int], None] | None = None,
+    cluster: str | None = None,
+    announce: Callable[[str], None] | None = None,
 ) -> DatasetResult:
     """Draw training pairs: pictures with and without flare, their layers, masks and parameters.
 
@@ -106,6 +109,11 @@ def dataset(
         Called after each item with its result, the number of finished items and the number of all.
     prepare : callable, optional
         Called with projects and the number of threads before processes start: the command line compiles kernels here.
+    cluster : str, optional
+        Workers of a Dask cluster draw: "local:4", "tcp://HOST:PORT" or "slurm:FILE" (docs/many-machines.md). None:
+        processes of this machine.
+    announce : callable, optional
+        Called with sentences about the cluster as they arise.
 
     Returns
     -------
@@ -115,7 +123,7 @@ def dataset(
     ------
     FlarewrightError
         The specification, a lens or a background cannot be used, the folder holds something else, a file cannot be
-        written, or a process was lost.
+        written, a process was lost, or there is no such cluster.
     MemoryError
         There is too little memory for an item.
 
@@ -125,6 +133,7 @@ def dataset(
     >>> dataset("pairs.toml", "pairs", items=1000).complete                             # doctest: +SKIP
     True
     """
+    processes = workers_of(cluster, processes, threads)
     plan = plan_of(spec, output)
     if not 1 <= items <= MOST_ITEMS:
         raise ProjectError(f"{items} items are not possible; give 1 to {MOST_ITEMS}")
@@ -148,19 +157,23 @@ def dataset(
     width, height = settings.size_px
     fit = fitting(_PROCESS_BYTES + width * height * _PIXEL_BYTES, threads)
     number, each = shares(len(todo), processes or fit, threads)
-    if prepare is not None and todo:
-        for index in todo[:: max(1, len(todo) // _COMPILED)][:_COMPILED]:
-            prepare(draw_item(settings, index).project, number * each)
     open_units = {index: unit for unit in units for index in unit} if settings.layout == "webdataset" else {}
     missing = {id(unit): len(unit) for unit in units}
-    for one in work_off(_WRITE, plan, todo, processes=number, threads=each, what="item"):
-        done.append(one.result)
-        if (unit := open_units.get(one.item)) is not None:
-            missing[id(unit)] -= 1
-            if missing[id(unit)] == 0:
-                _pack(plan, unit)
-        if report is not None:
-            report(one.result, len(done), len(mine))
+    with open_cluster(cluster if todo else None, plan.folder, announce) as executor:
+        # other machines have their own compiled kernels
+        if prepare is not None and todo and (executor is None or executor.local):
+            for index in todo[:: max(1, len(todo) // _COMPILED)][:_COMPILED]:
+                prepare(draw_item(settings, index).project, number * each)
+        for one in work_off(_WRITE, plan, todo, processes=number, threads=each, what="item", executor=executor):
+            done.append(one.result)
+            if (unit := open_units.get(one.item)) is not None:
+                missing[id(unit)] -= 1
+                if missing[id(unit)] == 0:
+                    _pack(plan, unit)
+            if report is not None:
+                report(one.result, len(done), len(mine))
+        if executor is not None:
+            number = executor.workers
     remarks = []
     if (many := _write_manifest(plan, items)) > 0:
         remarks.append(f"{many} of {items} items are not drawn yet; the manifest is written when all are")

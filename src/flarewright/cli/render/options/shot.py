@@ -123,6 +123,13 @@ class ShotOutput(MovieOptions, LayerOptions, ShotFiles):
         str | None,
         typer.Option(metavar="I/N", help="Draw part I of N of the frames, for render farms.", rich_help_panel=WORK),
     ] = None
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WHERE", help="Draw on a Dask cluster: local:N, tcp://HOST:PORT or slurm:FILE.",
+            rich_help_panel=WORK,
+        ),
+    ] = None  # fmt: skip
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a summary as one JSON object.", rich_help_panel=WORK)
     ] = False
