@@ -29,6 +29,7 @@ import numba
 import numpy as np
 
 import flarewright
+from benchmarks.cluster import cluster
 from benchmarks.dataset import pairs
 from benchmarks.design import design
 from benchmarks.lights import area, lights, surfaces
@@ -68,7 +69,8 @@ from flarewright.render.scene.shots import make_shots
 
 PARTS = (
     "yardsticks", "trace", "raster", "frame", "passes", "art", "built", "lights", "area", "surfaces", "scatter",
-    "ringing", "reference", "design", "residual", "startup", "memory", "small", "dataset", "scaling", "suite",
+    "ringing", "reference", "design", "residual", "startup", "memory", "small", "dataset", "cluster", "scaling",
+    "suite",
 )  # fmt: skip
 
 LIGHT = (10.0, 5.0)
@@ -507,6 +509,7 @@ def main(arguments: list[str] | None = None) -> None:
         "memory": memory,
         "small": lambda: small(row, given.repeat),
         "dataset": lambda: pairs(row),
+        "cluster": lambda: cluster(row, os.cpu_count() or 1),
         "scaling": lambda: scaling(row, os.cpu_count() or 1),
         "suite": lambda: suite(row, scalar, given.repeat, given.lens, given.size),
     }

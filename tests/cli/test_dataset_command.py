@@ -83,3 +83,18 @@ def test_bad_input_is_one_sentence_and_leaves_no_file(words, sentence, place, ca
     assert err.startswith("flarewright: error: ")
     assert err.count("\n") == 1
     assert [path.name for path in place.iterdir()] == ["pairs.toml"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("-o pairs --cluster local:x", "'x' is no number of worker processes"),
+        ("-o pairs --cluster local:2 --processes 2", "both set the processes; keep one"),
+        ("--preview a.png --cluster local", "--cluster has no effect on a contact sheet; leave it out"),
+        ("--example --cluster local", "--example only prints a specification; leave SPEC.toml out"),
+    ],
+)
+def test_a_cluster_that_cannot_be_used_is_refused(place, capsys, words, said):
+    assert run(["dataset", "pairs.toml", *words.split()]) == 2
+    assert said in capsys.readouterr().err
+    assert [path.name for path in place.iterdir()] == ["pairs.toml"]

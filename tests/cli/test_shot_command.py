@@ -142,3 +142,23 @@ def test_render_draws_a_frame_or_a_moment_and_says_which(place, capsys):
 def test_a_moment_outside_is_refused(place, capsys, words, said):
     assert run(["render", "--project", "p.toml", "-o", "a.exr", *words.split()]) == 2
     assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--cluster local:0", "'0' is no number of worker processes from 1 to 1024"),
+        ("--cluster farm", "cluster 'farm' is unknown; write local, local:4, tcp://HOST:PORT or slurm:FILE"),
+        ("--cluster local:2 --processes 2", "--processes 2 and --cluster local:2 both set the processes; keep one"),
+        ("--cluster tcp://a:1 --processes 2", "--processes has no effect on --cluster tcp://a:1"),
+        ("--cluster tcp://a:1 --threads 2", "--threads has no effect on --cluster tcp://a:1"),
+        ("--cluster slurm:none.toml", "none.toml does not exist"),
+    ],
+)
+def test_a_cluster_that_cannot_be_used_is_one_sentence(place, capsys, words, said):
+    pytest.importorskip("distributed", reason="needs the extra cluster")
+    assert run(["shot", "--project", "p.toml", "-o", "f.####.exr", *words.split()]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert len(err.strip().splitlines()) == 1
+    assert [path.name for path in place.iterdir()] == ["p.toml"]

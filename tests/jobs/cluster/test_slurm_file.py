@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from flarewright.errors import ProjectError
-from flarewright.jobs.cluster.slurm_file import read_slurm_settings
+from flarewright.jobs.cluster.choice import RunningChoice, parse_cluster
+from flarewright.jobs.cluster.slurm_file import SlurmSettings, read_slurm_settings
 
+ROOT = Path(__file__).parents[3]
 GOOD = 'jobs = 10\ncores = 16\nmemory = "32GB"\nwalltime = "1-02:00:00"\nprologue = ["module load python"]\n'
 
 
@@ -46,3 +50,27 @@ def test_an_error_is_one_sentence(tmp_path, text, words):
 def test_a_missing_file_is_one_sentence(tmp_path):
     with pytest.raises(ProjectError, match="does not exist"):
         read_slurm_settings(tmp_path / "none.toml")
+
+
+def test_the_recipe_is_valid_and_the_page_names_every_key():
+    assert read_slurm_settings(ROOT / "docs/recipes/slurm.toml").cores == 16
+    page = (ROOT / "docs/many-machines.md").read_text()
+    assert [name for name in SlurmSettings.model_fields if f"`{name}`" not in page] == []
+
+
+def test_the_recipe_for_kubernetes_starts_workers_that_are_accepted():
+    yaml = pytest.importorskip("yaml", reason="comes with the extra cluster")
+    parts = list(yaml.safe_load_all((ROOT / "docs/recipes/kubernetes.yaml").read_text()))
+    containers = {
+        one["name"]: one
+        for part in parts
+        if part["kind"] != "Service"
+        for one in part["spec"]["template"]["spec"]["containers"]
+    }
+    worker, shot = containers["worker"]["command"], containers["shot"]["args"]
+    assert worker[worker.index("--nthreads") + 1] == "1"
+    address = shot[shot.index("--cluster") + 1]
+    assert parse_cluster(address) == RunningChoice(worker[2])
+    service = next(part for part in parts if part["kind"] == "Service")
+    assert address == f"tcp://{service['metadata']['name']}:{service['spec']['ports'][0]['port']}"
+    assert containers["worker"]["workingDir"] == containers["shot"]["workingDir"]

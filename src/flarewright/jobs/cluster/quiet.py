@@ -20,7 +20,7 @@ def quiet() -> Iterator[None]:
     """Keep Dask's log and warnings from stderr inside the block: its incidents become sentences of ours."""
     loggers = [logging.getLogger(name) for name in _LOGGERS]
     levels = [logger.level for logger in loggers]
-    # the import sets levels of its own
+    # the import sets other levels
     optional("distributed", "cluster", "--cluster")
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module=r"(distributed|dask|dask_jobqueue|tornado)(\.|$)")
