@@ -3,6 +3,7 @@
 The command line and other front ends call these functions; nothing here prints.
 
 - `measure_run`: `run_stages` runs the stages of a measurement in a run's folder (`StageResult`)
+- `measure_merge`: `merge_on` merges photographs, on this machine or on a cluster
 - `measure_provenance`: `STAGES`; records from which model the file of a later stage was made
 - `lens_search`: `search_lenses` searches lenses for a project's targets and returns a `LensSearch`
 - `flare_curves`: `flare_curves` predicts a lens' flare over the constellation

@@ -1,5 +1,6 @@
 """A merged run: light, axis and angles as planted; resuming changes nothing; RAW files work like any others."""
 
+import pickle
 from dataclasses import replace as changed
 
 import numpy as np
@@ -15,7 +16,7 @@ from flarewright.io.measurement.merged import read_frame, read_run
 from flarewright.measure.merging.camera_geometry import SightingInput, solve_geometry
 from flarewright.measure.merging.light_position import find_light
 from flarewright.measure.merging.settings import MergeSettings
-from flarewright.measure.pipeline.merge_stage import merge_captures
+from flarewright.measure.pipeline.merge_stage import merge_captures, merge_frame
 from flarewright.measure.pipeline.search_images import reference_of
 from flarewright.model.measurement.capture import CameraNoise
 
@@ -98,6 +99,36 @@ def test_a_stopped_run_resumes_with_the_same_result(tmp_path):
     assert {name for name, stamp in third.items() if stamp != ended[name]} == {"frame-002.exr"}
     merge_captures(captures, tmp_path, tmp_path / "run", settings=MergeSettings(white_balance=(2.0, 1.0, 1.5)))
     assert not stamps(tmp_path / "run").items() & third.items()
+
+
+def frame_bytes(folder):
+    return {path.name: path.read_bytes() for path in (folder / "frames").glob("*.exr")}
+
+
+def test_frames_that_are_merged_elsewhere_are_the_same(tmp_path):
+    captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
+    whole = merge_captures(captures, tmp_path, tmp_path / "whole", camera=KNOWN)
+
+    def elsewhere(plan, numbers, workers):
+        assert workers == 2
+        for number in reversed(numbers):
+            yield pickle.loads(pickle.dumps(merge_frame(pickle.loads(pickle.dumps(plan)), number, 1)))
+
+    again = merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN, threads=2, spread=elsewhere)
+    assert again == whole
+    assert frame_bytes(tmp_path / "run") == frame_bytes(tmp_path / "whole")
+
+
+@pytest.mark.slow
+def test_frames_that_a_cluster_merges_are_the_same(tmp_path):
+    pytest.importorskip("distributed", reason="needs the extra cluster")
+    from flarewright.workflow.measure_merge import merge_on
+
+    captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
+    whole = merge_on(None, captures, tmp_path, tmp_path / "whole", camera=KNOWN)
+    again = merge_on("local:2", captures, tmp_path, tmp_path / "run", camera=KNOWN)
+    assert again == whole
+    assert frame_bytes(tmp_path / "run") == frame_bytes(tmp_path / "whole")
 
 
 def test_a_damaged_frame_is_reported_and_merged_again(tmp_path):

@@ -48,6 +48,10 @@ Upright = Annotated[bool, typer.Option("--upright", help="Rotate frames to remov
 Threads = Annotated[
     int | None, typer.Option(min=1, help="Number of threads, without effect on the pixels (default: all cores).")
 ]
+Cluster = Annotated[
+    str | None,
+    typer.Option(metavar="WHERE", help="Merge on a Dask cluster: local:N, tcp://HOST:PORT or slurm:FILE."),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
@@ -60,13 +64,14 @@ def merge_command(
     white_balance: WhiteBalance = "none",
     upright: Upright = False,
     threads: Threads = None,
+    cluster: Cluster = None,
     as_json: Json = False,
 ) -> None:
     """Merge exposures in linear light, and estimate the light's place, the optical axis and the camera's noise.
 
     Resumes an interrupted run into the same folder.
     """
-    run = _merge(captures, output, camera, angles, _settings(block, white_balance, upright), threads)
+    run = _merge(captures, output, camera, angles, _settings(block, white_balance, upright), threads, cluster)
     print_remarks(run.remarks)
     if as_json:
         print_json({"folder": str(output), "stages": ["merge"], "merge": merge_summary(run)})
@@ -90,6 +95,7 @@ def run(
     by: By = "joint",
     no_residual: NoResidual = False,
     threads: Threads = None,
+    cluster: Cluster = None,
     as_json: Json = False,
 ) -> None:
     """Run the stages of a measurement in order; finished stages are kept."""
@@ -99,6 +105,8 @@ def run(
     _check_there(captures)
     if corrections is not None and "find" not in chosen:
         raise FlarewrightError("--corrections are for the stage find, which --stages omits: add it, or drop them")
+    if cluster is not None and "merge" not in chosen:
+        raise FlarewrightError("--cluster is for the stage merge, which --stages omits: add it, or drop --cluster")
     if no_residual and not {"fit", "compress"} & set(chosen):
         raise FlarewrightError(
             "--no-residual is for the stages fit and compress, which --stages omits: add one, or drop it"
@@ -110,7 +118,8 @@ def run(
     settings = _settings(block, white_balance, upright)
     facts: dict[str, Any] = {"folder": str(output), "stages": chosen}
     if "merge" in chosen:
-        merged = _merge(captures, output, camera, angles, settings, threads, 1 if chosen == ["merge"] else every)
+        spacing = 1 if chosen == ["merge"] else every
+        merged = _merge(captures, output, camera, angles, settings, threads, cluster, spacing)
         print_remarks(merged.remarks)
         facts["merge"] = merge_summary(merged)
         if not as_json:
@@ -163,13 +172,15 @@ def _merge(
     angles: str | None,
     settings: MergeSettings,
     threads: int | None,
+    cluster: str | None = None,
     every: int = 1,
 ) -> MergedRun:
     """Merge exposures; `every` n-th frame is what later stages use, which is checked first."""
     from ...io.measurement.captures import captures_folder, parse_rule, read_capture_list
     from ...measure.core.frame_reading import check_every
-    from ...measure.pipeline.merge_stage import check_same_run, exposure_groups, merge_captures
+    from ...measure.pipeline.merge_stage import check_same_run, exposure_groups
     from ...measure.report.overview import write_overview
+    from ...workflow.measure_merge import merge_on
 
     _check_there(captures)
     rule = None if angles is None else parse_rule(angles)
@@ -181,7 +192,8 @@ def _merge(
         listed, remarks = read_capture_list(captures, rule)
         rolls = Counter(group[0].roll_deg for group in exposure_groups(listed))
         check_every(list(rolls.values()), every, captures)
-        merged = merge_captures(
+        merged = merge_on(
+            cluster,
             listed,
             captures_folder(captures),
             output,
@@ -191,6 +203,7 @@ def _merge(
             progress=started,
             remarks=remarks,
             report=lambda line: print_remarks([line]),
+            announce=lambda line: print_remarks([line]),
         )
         write_overview(output, merged)
     return merged

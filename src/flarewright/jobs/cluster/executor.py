@@ -41,12 +41,16 @@ class Cluster:
     connection : Connection
     local : bool
         Whether the workers are processes of this machine.
+    chosen : int, optional
+        Number of local workers that the text states.
     folder, mark : str
         As of `worker_side.Order`.
     """
 
-    def __init__(self, connection: Connection, local: bool, folder: str = "", mark: str = "") -> None:
-        self._connection, self.local = connection, local
+    def __init__(
+        self, connection: Connection, local: bool, chosen: int | None = None, folder: str = "", mark: str = ""
+    ) -> None:
+        self._connection, self.local, self.chosen = connection, local, chosen
         self._folder, self._mark = folder, mark
 
     @property
@@ -229,16 +233,15 @@ def open_cluster(
         return
     choice = parse_cluster(text)
     say = announce or (lambda _: None)
-    local = isinstance(choice, LocalChoice)
     with quiet(), ExitStack() as stack:
         connection = connect(choice, say)
         stack.callback(connection.close)
-        if local:
-            yield Cluster(connection, True)
+        if isinstance(choice, LocalChoice):
+            yield Cluster(connection, True, choice.workers)
             return
         mark = Path(folder).resolve() / f".flarewright-{uuid4().hex}"
         write_bytes_atomically(mark, b"A command that draws on several machines is running.\n")
         stack.callback(mark.unlink, missing_ok=True)
-        cluster = Cluster(connection, False, os.getcwd(), str(mark))
+        cluster = Cluster(connection, False, None, os.getcwd(), str(mark))
         cluster.check(say)
         yield cluster

@@ -10,8 +10,9 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from math import hypot
 from pathlib import Path
@@ -57,11 +58,58 @@ class _Merged:
     clipped_share: float
 
 
+@dataclass(frozen=True)
+class MergePlan:
+    """What all frames of a run share; with a frame's number it determines the frame.
+
+    Attributes
+    ----------
+    groups : tuple of tuple of Capture
+        Exposures of each frame.
+    folder, output : Path
+        Of the photographs and of the run.
+    known : CameraCalibration
+    balance : tuple of float
+    common : str
+        Digest of what all frames share.
+    settings : MergeSettings
+    """
+
+    groups: tuple[tuple[Capture, ...], ...]
+    folder: Path
+    output: Path
+    known: CameraCalibration
+    balance: tuple[float, float, float]
+    common: str
+    settings: MergeSettings
+
+
+@dataclass(frozen=True)
+class FrameOutcome:
+    """A frame that is merged or kept.
+
+    Attributes
+    ----------
+    number : int
+    merged : _Merged
+    lines : tuple of str
+        Lines for the user.
+    """
+
+    number: int
+    merged: _Merged
+    lines: tuple[str, ...]
+
+
+Spread = Callable[[MergePlan, Sequence[int], int], Generator[FrameOutcome, None, None]]
+"""Calls `merge_frame` for the numbers of frames, on at most so many workers, and yields the outcomes as they come."""
+
+
 def merge_captures(
     captures: Sequence[Capture], folder: Path, output: Path, *, camera: CameraNoise | None = None,
     settings: MergeSettings = MergeSettings(), threads: int | None = None, progress: Progress | None = None,
     remarks: Sequence[str] = (),
-    report: Report = lambda _: None,
+    report: Report = lambda _: None, spread: Spread | None = None,
 ) -> MergedRun:  # fmt: skip
     """Merge all constellations, locate the light and the optical axis, and write the run.
 
@@ -83,6 +131,8 @@ def merge_captures(
         Of the list of captures; the run keeps them.
     report : callable
         Called with a sentence for each frame of an earlier run that is damaged; it is merged again.
+    spread : callable, optional
+        Merges the frames elsewhere, such as on a cluster (`workflow.measure_merge`). None: on threads.
 
     Returns
     -------
@@ -103,7 +153,7 @@ def merge_captures(
     balance = _balance(settings, known, folder / groups[0][0].file)
     _refuse_other_run(output, folder, captures, known.size_px)
     output = _folder(output, len(groups), known.size_px)
-    merged = _merge_all(groups, folder, output, known, balance, threads, tell, settings, report)
+    merged = _merge_all(groups, folder, output, known, balance, threads, tell, settings, report, spread)
     found = believable([one.sighting for one in merged], settings.geometry)
     tell(0.95, "axis")
     geometry = _geometry(merged, found, output, known, settings.geometry)
@@ -203,6 +253,7 @@ def _drop_stale(output: Path, frames: int) -> None:
 def _merge_all(
     groups: Sequence[tuple[Capture, ...]], folder: Path, output: Path, known: CameraCalibration,
     balance: tuple[float, float, float], threads: int | None, tell: Progress, settings: MergeSettings, report: Report,
+    spread: Spread | None,
 ) -> list[_Merged]:  # fmt: skip
     # what follows the frames is not in their digest; white balance and block are in `balance` and `known`
     steering = MergeSettings(calibration=settings.calibration, exposures=settings.exposures, light=settings.light)
@@ -211,36 +262,56 @@ def _merge_all(
         known.block, _array_digest(known.black), _array_digest(known.response),
         *(() if steering == MergeSettings() else (repr(steering),)),
     ])  # fmt: skip
+    plan = MergePlan(tuple(groups), folder, output, known, balance, common, settings)
     merged: dict[int, _Merged] = {}
     fitting = max(1, int(_WORKING_BYTES / (_PIXEL_BYTES * known.size_px[0] * known.size_px[1])))
-    with ThreadPoolExecutor(max_workers=min(threads or os.cpu_count() or 1, fitting)) as pool:
-        jobs = {
-            pool.submit(_frame, k, group, folder, output, known, balance, common, settings=settings, report=report): k
-            for k, group in enumerate(groups)
-        }
+    workers = min(threads or os.cpu_count() or 1, fitting)
+    with closing((spread or _on_threads)(plan, range(len(groups)), workers)) as outcomes:
+        for one in outcomes:
+            for line in one.lines:
+                report(line)
+            merged[one.number] = one.merged
+            tell(0.02 + 0.93 * len(merged) / len(groups), f"frame {len(merged)} of {len(groups)}")
+    return [merged[k] for k in range(len(groups))]
+
+
+def _on_threads(plan: MergePlan, numbers: Sequence[int], workers: int) -> Generator[FrameOutcome, None, None]:
+    with ThreadPoolExecutor(max_workers=workers) as pool:
+        jobs = [pool.submit(merge_frame, plan, number) for number in numbers]
         try:
             for job in as_completed(jobs):
-                merged[jobs[job]] = job.result()
-                tell(0.02 + 0.93 * len(merged) / len(groups), f"frame {len(merged)} of {len(groups)}")
+                yield job.result()
         except BaseException:
             # an interrupt or a damaged file: cancel the frames that have not started
             pool.shutdown(wait=True, cancel_futures=True)
             raise
-    return [merged[k] for k in range(len(groups))]
 
 
-def _frame(
-    number: int, group: tuple[Capture, ...], folder: Path, output: Path, known: CameraCalibration,
-    balance: tuple[float, float, float], common: str, settings: MergeSettings, report: Report,
-) -> _Merged:  # fmt: skip
-    """Merge one constellation, or return the frame of an earlier run if it is up to date."""
-    file = f"{FRAMES}/frame-{number:03d}.exr"
+def merge_frame(plan: MergePlan, number: int, threads: int | None = None) -> FrameOutcome:
+    """Merge one constellation, or return the frame of an earlier run if it is up to date.
+
+    Parameters
+    ----------
+    plan : MergePlan
+    number : int
+        Of the frame.
+    threads : int, optional
+        Not used: a frame has one thread.
+
+    Raises
+    ------
+    FlarewrightError
+        As of `merge_captures`.
+    """
+    del threads
+    group, folder, output, known, settings = plan.groups[number], plan.folder, plan.output, plan.known, plan.settings
+    file, lines = f"{FRAMES}/frame-{number:03d}.exr", list[str]()
     note = output / f"{FRAMES}/frame-{number:03d}.json"
     stamps = [(folder / one.file).stat() for one in group]
-    digest = _digest([common, [one.model_dump() for one in group], [(s.st_size, s.st_mtime_ns) for s in stamps]])
-    kept = _kept_sighting(note, digest, output / file, report)
+    digest = _digest([plan.common, [one.model_dump() for one in group], [(s.st_size, s.st_mtime_ns) for s in stamps]])
+    kept = _kept_sighting(note, digest, output / file, lines.append)
     if kept is not None:
-        return _Merged(file, group, kept, kept.clipped_share)
+        return FrameOutcome(number, _Merged(file, group, kept, kept.clipped_share), tuple(lines))
     shots = [known.exposure(open_photo(folder / one.file, _white_of(known), known.block), one) for one in group]
     for one in shots:
         refuse_damage(one, settings=settings.exposures)
@@ -250,7 +321,7 @@ def _frame(
     mean, variance = merge_exposures(shots, settings=settings.exposures)
     # unit: a radiance of 1 saturates the sensor in one second
     full = float(np.mean(shots[0].full)) if np.isfinite(known.white) else 1.0
-    scale = np.asarray(balance, np.float32) / np.float32(full)
+    scale = np.asarray(plan.balance, np.float32) / np.float32(full)
     mean, variance = without_idle_digits(mean * scale, variance * scale**2)
     sighting = _with_given_light(find_light(mean, variance, settings.light), group, known, settings.light)
     info = FrameInfo(file=file, constellation_deg=group[0].constellation_deg or 0.0, nominal_deg=0.0,
@@ -261,7 +332,7 @@ def _frame(
         "ratios": [asdict(one) for one in ratios], "from": _origin(folder, group),
     }  # fmt: skip
     write_text_atomically(note, json.dumps(facts) + "\n")
-    return _Merged(file, group, sighting, sighting.clipped_share)
+    return FrameOutcome(number, _Merged(file, group, sighting, sighting.clipped_share), tuple(lines))
 
 
 def _with_given_light(
