@@ -124,6 +124,19 @@ def test_folders_and_options_that_cannot_be_used_are_refused(listed, tmp_path, c
         ("--white-balance 'warm'", "merge", listed, "--white-balance", "warm", "-o", tmp_path / "run"),
         ("the rule 'x'", "merge", listed, "--angles", "x", "-o", tmp_path / "run"),
         ("nothing.json does not exist", "merge", listed, "--camera", tmp_path / "nothing.json", "-o", tmp_path / "run"),
+        ("cluster 'farm' is unknown", "merge", listed, "--cluster", "farm", "-o", tmp_path / "run"),
+        (
+            "--threads has no effect on --cluster tcp://a:1",
+            "merge",
+            listed,
+            "--cluster",
+            "tcp://a:1",
+            "--threads",
+            "2",
+            "-o",
+            tmp_path / "run",
+        ),
+        ("--cluster is for the stage merge", "run", listed, "--stages", "find", "--cluster", "local", "-o", tmp_path),
     ):
         assert words in refused(capsys, "measure", *arguments)
 

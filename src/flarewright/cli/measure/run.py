@@ -71,6 +71,10 @@ def merge_command(
 
     Resumes an interrupted run into the same folder.
     """
+    from ...jobs.cluster.executor import workers_of
+
+    # later stages, which `run` has, use threads here
+    workers_of(cluster, None, threads)
     run = _merge(captures, output, camera, angles, _settings(block, white_balance, upright), threads, cluster)
     print_remarks(run.remarks)
     if as_json:

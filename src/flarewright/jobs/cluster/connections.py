@@ -28,6 +28,8 @@ _ANSWER_S, _FIRST_WORKER_S, _NO_WORKER_S = 5.0, 20.0, 300.0
 _SLURM_S = 60.0
 # time to leave a cluster
 _LEAVE_S = 5.0
+# time after which a silent local worker counts as lost: never, for its process is watched, and an item can take hours
+_SILENT_S = 1e8
 # time between two announcements that jobs wait
 _WAITING_S = 60.0
 
@@ -89,12 +91,17 @@ class LocalConnection:
         distributed = optional("distributed", "cluster", "--cluster")
         security = _own_security(distributed)
         self._scratch = tempfile.TemporaryDirectory(prefix="flarewright-", ignore_cleanup_errors=True)
-        self._cluster = distributed.LocalCluster(
-            n_workers=0, processes=True, security=security, host="127.0.0.1", dashboard_address="127.0.0.1:0",
-            silence_logs=logging.CRITICAL + 1,
-            # no worker is given up because an item takes long
-            scheduler_kwargs={"worker_ttl": None},
-        )  # fmt: skip
+        try:
+            self._cluster = distributed.LocalCluster(
+                n_workers=0, processes=True, security=security, host="127.0.0.1", dashboard_address="127.0.0.1:0",
+                silence_logs=logging.CRITICAL + 1, scheduler_kwargs={"worker_ttl": _SILENT_S},
+            )  # fmt: skip
+        # no free port, or no permission to open one
+        except Exception as error:
+            self._scratch.cleanup()
+            raise FlarewrightError(
+                f"no local cluster can be started{_reason(error)}; omit --cluster for plain processes"
+            ) from None
         self.client = distributed.Client(self._cluster, security=security, set_as_default=False)
         start = LocalWorker(self._cluster.scheduler_address, security, 0, self._scratch.name)
         self._workers = LocalWorkers(start, announce)
