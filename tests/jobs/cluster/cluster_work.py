@@ -63,7 +63,7 @@ class Client:
     """What the executor uses of a client; runs tasks in this process."""
 
     def __init__(self, fails=None):
-        self.fails, self.waiting, self.most, self.submitted = fails, 0, 0, []
+        self.fails, self.waiting, self.most, self.submitted, self.status = fails, 0, 0, [], "running"
 
     def nthreads(self):
         return {"tcp://a:1": 1, "tcp://b:1": 1}

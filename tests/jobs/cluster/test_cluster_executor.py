@@ -65,6 +65,21 @@ def test_a_lost_scheduler_is_one_sentence():
         through(connection)
 
 
+def test_a_scheduler_that_is_lost_while_items_are_submitted_is_one_sentence():
+    connection = cluster_work.Connection()
+    submit = connection.client.submit
+
+    def broken(function, *arguments, key, pure):
+        if key.endswith("-300"):
+            connection.client.status = "closed"
+            raise RuntimeError("the client is closed")
+        return submit(function, *arguments, key=key, pure=pure)
+
+    connection.client.submit = broken
+    with pytest.raises(FlarewrightError, match=r"the connection with the cluster is lost \(RuntimeError\)"):
+        through(connection, items=range(1000))
+
+
 def test_without_a_cluster_dask_is_not_imported(tmp_path):
     with open_cluster(None, tmp_path) as cluster:
         assert cluster is None
@@ -115,7 +130,7 @@ def test_a_real_cluster_works_off_several_lists(tmp_path, capfd):
         assert cluster.workers == len(workers) == 2
         assert {one.result[3] for one in done} == {os.getcwd()}
         with pytest.raises(FlarewrightError, match="no space left"):
-            list(work_off("cluster_work:refuse", 2, range(9), processes=2, threads=1, executor=cluster))
+            list(work_off("cluster_work:refuse", 2, range(3), processes=2, threads=1, executor=cluster))
         # it is of use after an error
         again = list(work_off("cluster_work:add", 0, (1,), processes=2, threads=1, executor=cluster))
         assert again[0].result[0] == 1

@@ -307,8 +307,10 @@ def _check_alive(client: Any, address: str, alone_since: float | None, longest_s
         raise FlarewrightError(
             f"the connection with the cluster at {address} is lost; finished work is kept: repeat the command"
         )
-    if client.status == "running" and client.nthreads():
-        return None
+    # a connection that breaks meanwhile is found by its state later
+    with suppress(Exception):
+        if client.status == "running" and client.nthreads():
+            return None
     now = time.monotonic()
     since = now if alone_since is None else alone_since
     if now - since > longest_s:

@@ -55,8 +55,10 @@ class Cluster:
 
     @property
     def workers(self) -> int:
-        """Number of workers now."""
-        return len(self._connection.client.nthreads())
+        """Number of workers now; 0 if the scheduler does not answer."""
+        with suppress(Exception):
+            return len(self._connection.client.nthreads())
+        return 0
 
     def work_off(
         self, function: str, context: Any, items: Sequence[Any], *, processes: int, threads: int | None, what: str
@@ -76,7 +78,8 @@ class Cluster:
 
         def submit(number: int) -> None:
             for place, item in islice(todo, number):
-                future = client.submit(work, shared, order, item, key=f"{what}-{run}-{place}", pure=False)
+                with _lost_as_sentence(client):
+                    future = client.submit(work, shared, order, item, key=f"{what}-{run}-{place}", pure=False)
                 pending[future.key] = (item, future)
                 future.add_done_callback(answers.put)
 
@@ -110,17 +113,39 @@ class Cluster:
             A worker has another version, several threads, or other folders.
         """
         client = self._connection.client
-        check_threads(client.nthreads(), client.scheduler.address)
-        here, found = facts(), client.run(facts, on_error="return")
-        refuse_other_versions(here, found)
-        lacking = client.run(missing_place, self._folder, self._mark, on_error="return")
+        with _lost_as_sentence(client):
+            check_threads(client.nthreads(), client.scheduler.address)
+            here, found = facts(), client.run(facts, on_error="return")
+            refuse_other_versions(here, found)
+            lacking = client.run(missing_place, self._folder, self._mark, on_error="return")
         for address, lacks in lacking.items():
-            if lacks:
+            # one that left meanwhile answers with an exception
+            if lacks and isinstance(lacks, str):
                 raise FlarewrightError(
                     f"the worker {address} on {found[address].host} {lacks}; give folders that all machines share"
                 )
         for line in differences(here, list(found.values())):
             announce(line)
+
+
+def _lost(error: BaseException) -> FlarewrightError:
+    return FlarewrightError(
+        f"the connection with the cluster is lost ({type(error).__name__}); finished work is kept: repeat the command"
+    )
+
+
+@contextmanager
+def _lost_as_sentence(client: Any) -> Iterator[None]:
+    """Turn an exception of the block into a sentence if the client has lost its scheduler."""
+    try:
+        yield
+    except FlarewrightError:
+        raise
+    except Exception as error:
+        # a broken connection is noticed by its user before its state changes
+        if client.status == "running" and not isinstance(error, OSError):
+            raise
+        raise _lost(error) from None
 
 
 def _gathered(connection: Connection, done: Sequence[tuple[Any, Any]], what: str) -> list[tuple[Any, ...]]:
@@ -146,10 +171,7 @@ def _gathered(connection: Connection, done: Sequence[tuple[Any, Any]], what: str
         # a repeated item can fail
         failed = [(item, future) for item, future in done if future.status == "error"]
         if not failed:
-            raise FlarewrightError(
-                f"the connection with the cluster is lost ({type(answers).__name__}); finished work is kept: repeat "
-                "the command"
-            )
+            raise _lost(answers)
     _raise_failed(*failed[0], what)
 
 
@@ -203,6 +225,11 @@ def workers_of(cluster: str | None, processes: int | None, threads: int | None) 
     return None
 
 
+def _remove(mark: Path) -> None:
+    with suppress(OSError):
+        mark.unlink(missing_ok=True)
+
+
 @contextmanager
 def open_cluster(
     text: str | None, folder: str | os.PathLike[str], announce: Callable[[str], None] | None = None
@@ -241,7 +268,7 @@ def open_cluster(
             return
         mark = Path(folder).resolve() / f".flarewright-{uuid4().hex}"
         write_bytes_atomically(mark, b"A command that draws on several machines is running.\n")
-        stack.callback(mark.unlink, missing_ok=True)
+        stack.callback(_remove, mark)
         cluster = Cluster(connection, False, None, os.getcwd(), str(mark))
         cluster.check(say)
         yield cluster
