@@ -156,7 +156,6 @@ def test_a_moment_outside_is_refused(place, capsys, words, said):
     ],
 )
 def test_a_cluster_that_cannot_be_used_is_one_sentence(place, capsys, words, said):
-    pytest.importorskip("distributed", reason="needs the extra cluster")
     assert run(["shot", "--project", "p.toml", "-o", "f.####.exr", *words.split()]) == 2
     err = capsys.readouterr().err
     assert said in err

@@ -17,7 +17,7 @@ from typing import Any, Protocol
 from ...errors import FlarewrightError, optional
 from .choice import LocalChoice, RunningChoice, SlurmChoice
 from .local_workers import LocalWorkers
-from .slurm_file import read_slurm_settings
+from .slurm_file import SlurmSettings
 from .worker_side import LocalWorker
 
 __all__ = ["Connection", "LocalConnection", "RunningConnection", "SlurmConnection", "connect"]
@@ -56,12 +56,16 @@ class Connection(Protocol):
         ...
 
 
-def connect(choice: LocalChoice | RunningChoice | SlurmChoice, announce: Callable[[str], None]) -> Connection:
+def connect(
+    choice: LocalChoice | RunningChoice | SlurmChoice, settings: SlurmSettings | None, announce: Callable[[str], None]
+) -> Connection:
     """Connect with a cluster.
 
     Parameters
     ----------
     choice : LocalChoice, RunningChoice or SlurmChoice
+    settings : SlurmSettings or None
+        Those in the file of a SlurmChoice.
     announce : callable
         Receives the dashboard's address, and what happens to workers, a sentence each.
 
@@ -76,7 +80,8 @@ def connect(choice: LocalChoice | RunningChoice | SlurmChoice, announce: Callabl
         case RunningChoice():
             return RunningConnection(choice.address, announce)
         case SlurmChoice():
-            return SlurmConnection(choice.file, announce)
+            assert settings is not None
+            return SlurmConnection(choice.file, settings, announce)
 
 
 class LocalConnection:
@@ -191,12 +196,12 @@ class SlurmConnection:
     Parameters
     ----------
     file : str
-        TOML file of `SlurmSettings`.
+        The file of the settings, for messages.
+    settings : SlurmSettings
     announce : callable
     """
 
-    def __init__(self, file: str, announce: Callable[[str], None]) -> None:
-        settings = read_slurm_settings(file)
+    def __init__(self, file: str, settings: SlurmSettings, announce: Callable[[str], None]) -> None:
         distributed = optional("distributed", "cluster", "--cluster")
         jobqueue = optional("dask_jobqueue", "slurm", "--cluster slurm")
         if missing := [name for name in ("sbatch", "scancel") if shutil.which(name) is None]:

@@ -20,9 +20,10 @@ from ...io.files.atomic_write import write_bytes_atomically
 from ..answers import Done, result_of
 from ..processes import next_answer
 from .checks import check_threads, differences, refuse_other_versions
-from .choice import LocalChoice, parse_cluster
+from .choice import LocalChoice, SlurmChoice, parse_cluster
 from .connections import Connection, connect
 from .quiet import quiet
+from .slurm_file import read_slurm_settings
 from .worker_side import Order, facts, missing_place, work
 
 __all__ = ["Cluster", "open_cluster"]
@@ -260,8 +261,9 @@ def open_cluster(
         return
     choice = parse_cluster(text)
     say = announce or (lambda _: None)
+    settings = read_slurm_settings(choice.file) if isinstance(choice, SlurmChoice) else None
     with quiet(), ExitStack() as stack:
-        connection = connect(choice, say)
+        connection = connect(choice, settings, say)
         stack.callback(connection.close)
         if isinstance(choice, LocalChoice):
             yield Cluster(connection, True, choice.workers)
