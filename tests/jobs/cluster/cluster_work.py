@@ -68,7 +68,7 @@ class Client:
     def nthreads(self):
         return {"tcp://a:1": 1, "tcp://b:1": 1}
 
-    def submit(self, function, *arguments, key, pure):
+    def submit(self, function, *arguments, key, pure, priority=0):
         def call():
             if self.fails and key.startswith("frame"):
                 raise self.fails

@@ -79,8 +79,10 @@ class Cluster:
 
         def submit(number: int) -> None:
             for place, item in islice(todo, number):
+                key = f"{what}-{run}-{place}"
                 with _lost_as_sentence(client):
-                    future = client.submit(work, shared, order, item, key=f"{what}-{run}-{place}", pure=False)
+                    # Dask treats submissions within a tenth of a second as equal; earlier items come first
+                    future = client.submit(work, shared, order, item, key=key, pure=False, priority=-place)
                 pending[future.key] = (item, future)
                 future.add_done_callback(answers.put)
 
