@@ -64,11 +64,15 @@ class Client:
 
     def __init__(self, fails=None):
         self.fails, self.waiting, self.most, self.submitted, self.status = fails, 0, 0, [], "running"
+        self.priorities = []
 
     def nthreads(self):
         return {"tcp://a:1": 1, "tcp://b:1": 1}
 
-    def submit(self, function, *arguments, key, pure, priority=0):
+    def submit(self, function, *arguments, key, pure, priority=None):
+        if priority is not None:
+            self.priorities.append(priority)
+
         def call():
             if self.fails and key.startswith("frame"):
                 raise self.fails

@@ -32,6 +32,8 @@ def test_all_items_come_back_and_those_ahead_are_few():
     assert [key.split("-")[0] for key in connection.client.submitted].count("context") == 1
     # results that are not fetched yet, and tasks ahead
     assert connection.client.most <= 2 * 256
+    assert connection.client.priorities == sorted(connection.client.priorities, reverse=True)
+    assert len(set(connection.client.priorities)) == 3000
     assert through(connection, items=()) == []
 
 
@@ -125,15 +127,10 @@ def test_a_real_cluster_works_off_several_lists(tmp_path, capfd):
             work_off("cluster_work:add", 100, range(40), processes=2, threads=1, what="frame", executor=cluster)
         )
         assert sorted(one.result[0] for one in done) == list(range(100, 140))
-        # earlier items come first, except for what two workers hold
-        assert all(abs(one.item - place) < 10 for place, one in enumerate(done))
         workers = {one.result[1] for one in done}
         assert os.getpid() not in workers
         # one can have worked off all items before the other one has started
         assert len(workers) in (1, 2)
-        end = time.monotonic() + 30.0
-        while cluster.workers < 2 and time.monotonic() < end:
-            time.sleep(0.1)
         assert cluster.workers == 2
         assert {one.result[3] for one in done} == {os.getcwd()}
         with pytest.raises(FlarewrightError, match="no space left"):

@@ -52,11 +52,14 @@ class Cluster:
         self, connection: Connection, local: bool, chosen: int | None = None, folder: str = "", mark: str = ""
     ) -> None:
         self._connection, self.local, self.chosen = connection, local, chosen
-        self._folder, self._mark = folder, mark
+        self._folder, self._mark, self._started = folder, mark, 0
 
     @property
     def workers(self) -> int:
-        """Number of workers now; 0 if the scheduler does not answer."""
+        """Number of local workers, also of those that start again; of others those that are there now."""
+        if self.local:
+            return self._started
+        # none if the scheduler does not answer
         with suppress(Exception):
             return len(self._connection.client.nthreads())
         return 0
@@ -68,8 +71,11 @@ class Cluster:
 
         An item whose worker is lost is repeated by another one, so a function must not mind to be called again.
         """
+        if not items:
+            return
         connection, client = self._connection, self._connection.client
         connection.grow(processes, threads)
+        self._started = max(self._started, processes)
         run = uuid4().hex[:12]
         # a task, so that the scheduler makes it again if all workers that hold it are lost
         shared = client.submit(pickle.loads, pickle.dumps(context), key=f"context-{run}", pure=False)
