@@ -9,12 +9,13 @@ from typing import Any
 
 from ..jobs.cluster.executor import Cluster, open_cluster
 from ..jobs.processes import shares, work_off
-from ..measure.pipeline.merge_stage import FrameOutcome, MergePlan, merge_captures
+from ..jobs.worker import WRITING
+from ..measure.pipeline.merge_stage import FrameOutcome, MergePlan, merge_captures, merge_frame
 from ..model.measurement.capture import Capture, MergedRun
 
-__all__ = ["merge_on"]
+__all__ = ["frame_on_worker", "merge_on"]
 
-_MERGE = "flarewright.measure.pipeline.merge_stage:merge_frame"
+_MERGE = "flarewright.workflow.measure_merge:frame_on_worker"
 
 
 def merge_on(
@@ -58,6 +59,12 @@ def merge_on(
     with open_cluster(cluster, there, announce) as executor:
         spread = None if executor is None else partial(_spread, executor)
         return merge_captures(captures, folder, output, spread=spread, **more)
+
+
+def frame_on_worker(plan: MergePlan, number: int, threads: int | None) -> FrameOutcome:
+    """Merge a frame in a process that can be ended; a frame has one thread."""
+    del threads
+    return merge_frame(plan, number, WRITING)
 
 
 def _spread(

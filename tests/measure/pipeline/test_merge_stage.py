@@ -112,7 +112,7 @@ def test_frames_that_are_merged_elsewhere_are_the_same(tmp_path):
     def elsewhere(plan, numbers, workers):
         assert workers == 2
         for number in reversed(numbers):
-            yield pickle.loads(pickle.dumps(merge_frame(pickle.loads(pickle.dumps(plan)), number, 1)))
+            yield pickle.loads(pickle.dumps(merge_frame(pickle.loads(pickle.dumps(plan)), number)))
 
     again = merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN, threads=2, spread=elsewhere)
     assert again == whole

@@ -12,7 +12,7 @@ import os
 import shutil
 from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import closing
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import asdict, dataclass, replace
 from math import hypot
 from pathlib import Path
@@ -287,7 +287,9 @@ def _on_threads(plan: MergePlan, numbers: Sequence[int], workers: int) -> Genera
             raise
 
 
-def merge_frame(plan: MergePlan, number: int, threads: int | None = None) -> FrameOutcome:
+def merge_frame(
+    plan: MergePlan, number: int, writing: AbstractContextManager[object] = nullcontext()
+) -> FrameOutcome:  # fmt: skip
     """Merge one constellation, or return the frame of an earlier run if it is up to date.
 
     Parameters
@@ -295,15 +297,14 @@ def merge_frame(plan: MergePlan, number: int, threads: int | None = None) -> Fra
     plan : MergePlan
     number : int
         Of the frame.
-    threads : int, optional
-        Not used: a frame has one thread.
+    writing : context manager
+        Entered while files are written: a lock of a process that must not end meanwhile.
 
     Raises
     ------
     FlarewrightError
         As of `merge_captures`.
     """
-    del threads
     group, folder, output, known, settings = plan.groups[number], plan.folder, plan.output, plan.known, plan.settings
     file, lines = f"{FRAMES}/frame-{number:03d}.exr", list[str]()
     note = output / f"{FRAMES}/frame-{number:03d}.json"
@@ -326,12 +327,13 @@ def merge_frame(plan: MergePlan, number: int, threads: int | None = None) -> Fra
     sighting = _with_given_light(find_light(mean, variance, settings.light), group, known, settings.light)
     info = FrameInfo(file=file, constellation_deg=group[0].constellation_deg or 0.0, nominal_deg=0.0,
                      light_px=sighting.position_px, axis_px=(0.0, 0.0))  # fmt: skip
-    write_frame(output, MergedFrame(info, mean, variance))
-    facts = {
-        "digest": digest, "sha256": digest_of(output / file), "sighting": asdict(sighting),
-        "ratios": [asdict(one) for one in ratios], "from": _origin(folder, group),
-    }  # fmt: skip
-    write_text_atomically(note, json.dumps(facts) + "\n")
+    with writing:
+        write_frame(output, MergedFrame(info, mean, variance))
+        facts = {
+            "digest": digest, "sha256": digest_of(output / file), "sighting": asdict(sighting),
+            "ratios": [asdict(one) for one in ratios], "from": _origin(folder, group),
+        }  # fmt: skip
+        write_text_atomically(note, json.dumps(facts) + "\n")
     return FrameOutcome(number, _Merged(file, group, sighting, sighting.clipped_share), tuple(lines))
 
 
