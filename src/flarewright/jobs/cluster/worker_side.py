@@ -21,7 +21,7 @@ from .quiet import quiet
 __all__ = ["Facts", "LocalWorker", "Order", "facts", "serve", "work"]
 
 # packages whose version can change the bytes of a file
-_COMPARED = ("numpy", "numba", "llvmlite", "scipy", "OpenEXR", "pillow")
+_COMPARED = ("numpy", "numba", "llvmlite", "scipy", "OpenEXR", "pillow", "av", "rawpy", "tifffile")
 # the working folder belongs to the process: one item at a time, whatever the number of threads
 _ONE = Lock()
 # marks that this process has found

@@ -102,7 +102,7 @@ class FrameOutcome:
 
 
 Spread = Callable[[MergePlan, Sequence[int], int], Generator[FrameOutcome, None, None]]
-"""Calls `merge_frame` for the numbers of frames, on at most this number of workers, and yields the outcomes as they come."""
+"""Calls `merge_frame` for the numbers of frames, on at most a number of workers, and yields the outcomes."""
 
 
 def merge_captures(
