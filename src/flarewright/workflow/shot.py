@@ -83,6 +83,7 @@ def shot(
     encoded: Callable[[int, int, int], None] | None = None,
     cluster: str | None = None,
     announce: Callable[[str], None] | None = None,
+    radiance: bool = False,
 ) -> ShotResult:
     """Draw frames of a project whose values change over time, and write a file for each.
 
@@ -136,6 +137,9 @@ def shot(
         processes of this machine.
     announce : callable, optional
         Called with sentences about the cluster as they arise.
+    radiance : bool
+        The layers have the values of a picture that shows the radiance of the scene, such as a rendered one, and add
+        to it as they are: the irradiances of the sensor times 4 N^2 / (pi T).
 
     Returns
     -------
@@ -160,6 +164,9 @@ def shot(
     from .shot_frame import ShotPlan
 
     _check(shutter_deg, subframes)
+    own = project.plate
+    if radiance and (plate is not None or (own is not None and own.lit)):
+        raise ProjectError("layers over a plate have its unit already; omit --radiance")
     processes = workers_of(cluster, processes, threads)
     if plate is not None:
         plate = replace(plate, first=project.timeline.start)
@@ -188,7 +195,7 @@ def shot(
         if found is not None:
             remarks += found.remarks
         _check_sequences(project, mine)
-        plan = ShotPlan(project, pattern.text, shutter_deg, subframes, parts, cropped, found, comp)
+        plan = ShotPlan(project, pattern.text, shutter_deg, subframes, parts, cropped, found, comp, radiance)
         if not mine:
             return ShotResult((), (*remarks, f"chunk {chunk} of {len(numbers)} frames is empty"), 0, found)
         _check_moments(plan, mine)

@@ -60,6 +60,8 @@ class ShotPlan:
         A plate whose sources are lights of the project.
     over : str
         File name of the comp of plate and flare, with a place for the frame's number; empty: none.
+    radiance : bool
+        The layers have the values of a picture that shows the radiance of the scene.
     """
 
     project: Project
@@ -70,6 +72,7 @@ class ShotPlan:
     cropped: bool = False
     plate: PlateShot | None = None
     over: str = ""
+    radiance: bool = False
 
     def path(self, frame: int) -> Path:
         """Return the file of a frame."""
@@ -84,10 +87,11 @@ class ShotPlan:
     def scale(self) -> float:
         """Factor of the irradiances in all files: that of the brightest light at any time, so that it is constant.
 
-        1 over a plate: layers have its unit, and add to it as they are.
+        1 over a plate and for radiances: layers add to the picture of the scene as they are.
         """
         own = self.project.plate
-        if self.plate is not None or (own is not None and own.lit) or self.project.output.pixel_type == "float":
+        lit = self.plate is not None or (own is not None and own.lit)
+        if lit or self.radiance or self.project.output.pixel_type == "float":
             return 1.0
         return half_scale(peak_intensity(self.project))
 
@@ -124,6 +128,10 @@ def _moment(plan: ShotPlan, at_s: float) -> tuple[Project, float]:
     # a time is a rounded number of frames
     frame = round(timeline.start + at_s * float(frame_rate(timeline.fps)), 6)
     project = with_frame_files(still(project_at(plan.project, at_s)), frame)
+    if plan.radiance:
+        from .plates.plate_frame import with_radiances
+
+        return with_radiances(project), 0.0
     if plan.plate is None:
         return project, 0.0
     # imports SciPy, which frames without a plate do not need

@@ -74,6 +74,7 @@ def shot(options: ShotOptions) -> None:
             encoded=encoded,
             cluster=options.cluster,
             announce=lambda line: print_remarks([line]),
+            radiance=options.radiance,
         )
     remarks = [*remarks, *result.remarks]
     print_remarks(remarks)

@@ -31,6 +31,7 @@ __all__ = [
     "plate_optics",
     "same_optics",
     "with_plate_lights",
+    "with_radiances",
     "write_comp",
 ]
 
@@ -69,6 +70,36 @@ def with_plate_lights(project: Project, plate: PlateShot, frame: float) -> tuple
         lights = tuple(light for light in lights if light.intensity > 0.0)
     found: Project = project.replace(lights=own + lights)
     return found, lost
+
+
+def with_radiances(project: Project) -> Project:
+    """Return a project whose layers have the values of a picture that shows the radiance of the scene.
+
+    Parameters
+    ----------
+    project : Project
+        At one moment. The intensities of its lights are irradiances.
+
+    Returns
+    -------
+    Project
+        With intensities times 4 N^2 / (pi T) (`plates.lights.plate_factor`): the direct image of a light of irradiance
+        E and solid angle omega has the value E / omega.
+
+    Raises
+    ------
+    ProjectError
+        The project is a measured flare, whose lens is unknown.
+    """
+    if is_measured(project):
+        raise ProjectError(
+            f"{project.lens} is a measured flare, whose lens is unknown, so radiances are too; give a lens, or omit "
+            "--radiance"
+        )
+    factor = plate_optics(project)[1]
+    lights = tuple(light.replace(intensity=light.intensity * factor) for light in project.lights)
+    found: Project = project.replace(lights=lights)
+    return found
 
 
 def plate_optics(project: Project) -> tuple[FieldMap, float]:

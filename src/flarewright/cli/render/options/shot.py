@@ -115,6 +115,14 @@ class ShotOutput(MovieOptions, LayerOptions, ShotFiles):
     cropped: Annotated[
         bool, typer.Option("--cropped", help="Write single ghosts in small data windows.", rich_help_panel=PANEL)
     ] = False
+    radiance: Annotated[
+        bool,
+        typer.Option(
+            "--radiance",
+            help="Write radiances of the scene, which add to a rendered picture as they are (default: irradiances).",
+            rich_help_panel=PANEL,
+        ),
+    ] = False
     processes: Annotated[
         int | None,
         typer.Option(min=1, help="Number of processes (default: one per core).", rich_help_panel=WORK),
