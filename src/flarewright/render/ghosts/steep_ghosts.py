@@ -355,7 +355,12 @@ def light_up_to_its_end(bright: float, at: Callable[[float], float]) -> tuple[fl
     places.append(0.5 * (places[-1] + dark))
     values.append(values[-1])
     part, light = np.array(places), np.array(values)
-    return float(np.trapezoid(light * (1.0 - part), part)), float(np.trapezoid(light * part, part))
+    return _trapezoids(light * (1.0 - part), part), _trapezoids(light * part, part)
+
+
+def _trapezoids(values: Floats, places: Floats) -> float:
+    """Return the integral of straight lines between values; NumPy 1 and 2 have different names for it."""
+    return float((np.diff(places) * (values[1:] + values[:-1]) / 2.0).sum())
 
 
 def over(values: Floats, carried: Floats) -> Floats:
