@@ -117,7 +117,7 @@ def _fill_group(group: Any, image: Any, frames: tuple[int, int], offset_px: tupl
     group.nodes.clear()
     sockets = _pass_sockets(group, image, frames)
     wanted = ["Image", *sockets]
-    if [item.name for item in group.interface.items_tree if item.in_out == "INPUT"] != wanted:
+    if [item.name for item in group.interface.items_tree if getattr(item, "in_out", "") == "INPUT"] != wanted:
         group.interface.clear()
         group.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
         group.interface.new_socket("Image", in_out="INPUT", socket_type="NodeSocketColor")

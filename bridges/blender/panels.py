@@ -71,6 +71,8 @@ def exported(context: Any) -> Generator[str, None, tuple[Export, Order]]:
     export = yield from read_scene(context)
     order = flare_order(context.scene, export)
     write_json(export.data, order.scene)
+    # frames that another machine draws are put into the compositor later
+    context.scene["flarewright_offset_px"] = export.window.offset_px
     return export, order
 
 
@@ -89,7 +91,6 @@ def rendered(context: Any) -> Generator[str, None, list[str]]:
     if running.code != 0:
         raise FlareError(running.error)
     count = len(running.summary().get("frames", ()))
-    scene["flarewright_offset_px"] = export.window.offset_px
     if scene.flarewright.composite:
         put_into_compositor(scene, order.pattern, export.frames[:2], export.window.offset_px)
     made = f"the flare of {count} frame{'s'[: count != 1]} is in {order.pattern.parent}"

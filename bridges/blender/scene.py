@@ -130,7 +130,8 @@ def _lights(scene: Any, graph: Any, remarks: dict[str, None]) -> Iterator[_Found
             continue
         if any(_hidden(each, graph) for each in own):
             continue
-        if item.type == "LIGHT" and item.data.type == "AREA" and getattr(item.data.cycles, "is_portal", False):
+        # a portal of Cycles guides samples and gives no light; without Cycles there is no such mark
+        if item.type == "LIGHT" and getattr(getattr(item.data, "cycles", None), "is_portal", False):
             continue
         matrix = [tuple(row) for row in instance.matrix_world]
         if parent is None:

@@ -130,6 +130,19 @@ def test_a_wall_hides_a_lamp_and_half_a_wall_half_of_it(registered, scene):
     assert len(set(tracks(registered)[1]["Lamp"].intensity.tolist())) == 1
 
 
+def test_lamps_of_a_collection_that_is_not_rendered_and_portals_are_left_out(registered, scene):
+    camera(scene)
+    lamp(scene, "POINT", (0, 0, -9), name="Kept")
+    hidden = bpy.data.collections.new("Hidden")
+    scene.collection.children.link(hidden)
+    dark = lamp(scene, "POINT", (1, 0, -9), name="Dark")
+    scene.collection.objects.unlink(dark)
+    hidden.objects.link(dark)
+    hidden.hide_render = True
+    lamp(scene, "AREA", (0, 0, -9), (3.14, 0, 0), name="Portal", size=1.0).data.cycles.is_portal = True
+    assert sorted(tracks(registered)[1]) == ["Kept"]
+
+
 @pytest.mark.parametrize("mark", ["passes", "hide_render", "visible_camera"])
 def test_what_is_not_seen_hides_nothing(registered, scene, mark):
     camera(scene)
