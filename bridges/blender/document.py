@@ -54,7 +54,8 @@ class LightPath:
             "frame": frame,
             "matrix": [list(row) for row in matrix],
             "intensity": level * part if seen else 0.0,
-            "rgb": [max(value, 0.0) / peak for value in rgb] if seen else [1.0, 1.0, 1.0],
+            # also of a hidden light: colours between two frames are interpolated
+            "rgb": [max(value, 0.0) / peak for value in rgb] if peak > 0.0 else [1.0, 1.0, 1.0],
             "visible": seen,
         }
         self.size = max(self.size, size)

@@ -219,40 +219,32 @@ def _parallel(lamp: Lamp, middle: Vector, radiance: float) -> list[Sample]:
     return [Sample(back, distance, pi * radiance)] if outside <= 1.0 and distance > 0.0 else []
 
 
-def mesh_samples(
-    triangles: Sequence[tuple[Vector, Vector, Vector]], radiances: Sequence[float], camera: Vector, count: int
-) -> list[Sample]:
-    """Return parts of a glowing surface with the irradiance of each at the camera.
+def mesh_samples(triangles: Sequence[tuple[Vector, Vector, Vector]], camera: Vector, count: int) -> list[Sample]:
+    """Return parts of a glowing surface of radiance 1 with the irradiance of each at the camera.
 
     Parameters
     ----------
     triangles : sequence
-        Corners in the world.
-    radiances : sequence of float
-        Of each triangle; both sides glow.
+        Corners in the world. Both sides glow.
     camera : tuple of float
     count : int
 
     Returns
     -------
     list of Sample
-        Points evenly spread over the light that leaves the surface. Those behind it are not left out: what is seen is
-        found out by the caller.
+        Points evenly spread over the surface. Those on its back are not left out: the caller finds out what is seen.
     """
-    weights = []
-    for (a, b, c), radiance in zip(triangles, radiances, strict=True):
-        weights.append(0.5 * length(cross(minus(b, a), minus(c, a))) * radiance)
-    total = sum(weights)
+    areas = [0.5 * length(cross(minus(b, a), minus(c, a))) for a, b, c in triangles]
+    total = sum(areas)
     if total <= 0.0:
         return []
     found = []
     passed, k = 0.0, 0
-    centre = mesh_centre(triangles, weights)
-    facing = unit(minus(centre, camera))
+    facing = unit(minus(_centre(triangles, areas), camera))
     for n in range(count):
         at = (n + 0.5) / count * total
-        while k < len(weights) - 1 and passed + weights[k] < at:
-            passed, k = passed + weights[k], k + 1
+        while k < len(areas) - 1 and passed + areas[k] < at:
+            passed, k = passed + areas[k], k + 1
         a, b, c = triangles[k]
         # an even lattice folded into the triangle
         u, v = ((n + 1) * _LATTICE[0]) % 1.0, ((n + 1) * _LATTICE[1]) % 1.0
@@ -270,13 +262,13 @@ def mesh_samples(
     return found
 
 
-def mesh_centre(triangles: Sequence[tuple[Vector, Vector, Vector]], weights: Sequence[float]) -> Vector:
-    """Return the weighted centre of triangles."""
+def _centre(triangles: Sequence[tuple[Vector, Vector, Vector]], areas: Sequence[float]) -> Vector:
+    """Return the centre of a surface."""
     middle: Vector = (0.0, 0.0, 0.0)
-    for corners, weight in zip(triangles, weights, strict=True):
+    for corners, area in zip(triangles, areas, strict=True):
         for corner in corners:
-            middle = plus(middle, times(corner, weight / 3.0))
-    return times(middle, 1.0 / sum(weights))
+            middle = plus(middle, times(corner, area / 3.0))
+    return times(middle, 1.0 / sum(areas))
 
 
 def _disc(count: int) -> list[tuple[float, float]]:

@@ -6,6 +6,7 @@ import shlex
 import subprocess
 import time
 from collections.abc import Generator
+from contextlib import suppress
 from typing import Any
 
 import bpy
@@ -35,7 +36,7 @@ def program_words() -> str:
 
 
 def flare_order(scene: Any, export: Export) -> Order:
-    """Return what the program is asked for."""
+    """Return what is to be drawn."""
     settings = scene.flarewright
     pattern, file = frame_pattern(_absolute(settings.output, "output"))
     lens = settings.lens.strip()
@@ -192,8 +193,12 @@ class _Steps(bpy.types.Operator):
     def execute(self, context: Any) -> set[str]:
         """Do all at once."""
         job = _State.job = Job(self.work(context))
+        said = ""
         try:
             while job.advance(1.0):
+                if job.words != said and bpy.app.background:
+                    print(f"Flarewright: {job.words}", flush=True)
+                said = job.words
                 time.sleep(0.02)
         finally:
             _State.job = None
@@ -226,6 +231,15 @@ class _Steps(bpy.types.Operator):
             if area.type == "PROPERTIES":
                 area.tag_redraw()
         return {"PASS_THROUGH"} if more else self._result(job)
+
+    def cancel(self, context: Any) -> None:
+        """Stop when Blender ends the operator itself, as for another file."""
+        job, _State.job = _State.job, None
+        if job is not None:
+            job.cancel()
+            # the scene may be gone
+            with suppress(ReferenceError):
+                job.advance(0.0)
 
     def _result(self, job: Job) -> set[str]:
         kind = {"FINISHED": "INFO", "CANCELLED": "WARNING"}.get(job.state, "ERROR")

@@ -20,7 +20,7 @@ _NEW_GROUP = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
 
 
 class Order(NamedTuple):
-    """What `flarewright shot` is asked for."""
+    """The values of a command `flarewright shot`."""
 
     lens: str
     scene: Path
@@ -105,7 +105,7 @@ class Running:
     """
 
     def __init__(self, command: Sequence[str]) -> None:
-        # a group of its own, so that the processes that draw end with it
+        # a separate group, so that the processes that draw end with it
         own = {"start_new_session": True} if os.name == "posix" else {"creationflags": _NEW_GROUP}
         try:
             self._process = subprocess.Popen(

@@ -12,6 +12,10 @@ from .vectors import Matrix, Vector, column, dot, length, minus, plus, times, un
 
 # rays to a glowing surface for each one to a lamp: many lie on its back, and its irradiance comes from them
 _GLOW_RAYS = 32
+# objects that have a surface
+_SURFACES = frozenset({"MESH", "CURVE", "SURFACE", "FONT", "META"})
+# a direction farther from the axis than 60 degrees is in no picture, so nothing before it is cut away there
+_LEAST_AHEAD = 0.5
 
 
 class Export(NamedTuple):
@@ -123,7 +127,8 @@ def _lights(scene: Any, graph: Any, remarks: dict[str, None]) -> Iterator[_Found
         item, parent = instance.object, instance.parent
         original = item.original
         marks = original.flarewright
-        if not (item.type == "LIGHT" or marks.glows) or marks.ignored or not instance.show_self:
+        glows = marks.glows and item.type in _SURFACES
+        if not (item.type == "LIGHT" or glows) or marks.ignored or not instance.show_self:
             continue
         own = [original, *([parent.original] if parent is not None else [])]
         if names is not None and not names & {each.name for each in own}:
@@ -165,10 +170,9 @@ class _Sight:
         self._near = camera.data.clip_start
         self._ahead = unit(times(column(camera.matrix_world, 2), -1.0))
 
-    def sees(self, sample: Sample) -> bool:
-        """Return whether nothing lies before a part of a light."""
-        ahead = dot(sample.direction, self._ahead)
-        start = self._near / ahead if ahead > 0.0 else 0.0
+    def sees(self, sample: Sample, only: Any = None) -> bool:
+        """Return whether nothing, or no part of one object, lies before a part of a light."""
+        start = self._near / max(dot(sample.direction, self._ahead), _LEAST_AHEAD)
         # a lamp inside a bulb or a glowing surface does not hide itself
         left = min(sample.distance * (1.0 - 1e-4) - start, 1e30)
         origin = plus(self.place, times(sample.direction, start))
@@ -179,7 +183,8 @@ class _Sight:
             if not hit:
                 return True
             original = item.original
-            if not (original.flarewright.passes or original.hide_render or not original.visible_camera):
+            unseen = original.flarewright.passes or original.hide_render or not original.visible_camera
+            if original == only or (only is None and not unseen):
                 return False
             passed = length(minus(tuple(place), origin)) + 1e-5 * max(sample.distance if left < 1e29 else 1.0, 1.0)
             origin, left = plus(origin, times(sample.direction, passed)), left - passed
@@ -274,9 +279,9 @@ def _add_glow(found: _Found, frame: int, sight: _Sight, paths: dict[Any, LightPa
         level = sum(part * value for part, value in zip(LUMINANCE, radiance, strict=True))
         if level <= 0.0:
             continue
-        for sample in mesh_samples(triangles, [1.0] * len(triangles), sight.place, _GLOW_RAYS * settings.rays):
+        for sample in mesh_samples(triangles, sight.place, _GLOW_RAYS * settings.rays):
             # a surface hides its own back also where nothing else counts
-            if not sight.sees(sample):
+            if not sight.sees(sample, None if settings.occlusion else found.item.original):
                 continue
             rgb = plus(rgb, times(radiance, sample.irradiance))
             spot = plus(sight.place, times(sample.direction, sample.distance))

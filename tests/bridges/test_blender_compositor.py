@@ -87,7 +87,8 @@ def test_the_flare_is_added_in_step_and_on_its_light(registered, scene, tmp_path
         star = passes["starburst"]
         near = np.hypot(*(np.indices(star.shape[:2]) + 0.5 - middle(without[k][..., :3])[::-1, None, None])) < 6.0
         assert middle(star * near[..., None]) == pytest.approx(middle(without[k][..., :3]), abs=0.1)
-        assert star.sum() == pytest.approx(without[k][..., :3].sum(), rel=0.05)
+        # some of it lies beyond the picture
+        assert star.sum() == pytest.approx(without[k][..., :3].sum(), rel=0.08)
     # a gain of one stop doubles a pass, and a second call keeps it
     scene.render.use_compositing = True
     node = next(each for each in scene.compositing_node_group.nodes if each.label == "Flarewright")
@@ -148,9 +149,13 @@ def test_motion_blur_is_the_scenes(registered, scene, tmp_path):
     camera(scene, lens=100.0)
     scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 0.5
     assert bpy.ops.flarewright.export() == {"FINISHED"}
+    assert bpy.ops.flarewright.copy_command() == {"FINISHED"}
     assert bpy.ops.flarewright.render() == {"FINISHED"}
-    sharp = flare(tmp_path, 1002)["starburst"]
-    assert (sharp.sum(axis=2).max(axis=0) > 0.3 * sharp.sum(axis=2).max()).sum() > 10
+    # the ball moves by half of its step in a frame; before the first one too
+    for frame in (1001, 1002, 1003):
+        columns = flare(tmp_path, frame)["starburst"].sum(axis=(0, 2))
+        wide = (columns > 0.3 * columns.max()).sum()
+        assert wide == pytest.approx(0.5 * 1.1 * 100.0 / 10.0 * 96 / 36.0, abs=8)
 
 
 @pytest.mark.parametrize(

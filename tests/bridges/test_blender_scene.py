@@ -219,6 +219,8 @@ def test_a_glowing_panel_has_its_irradiance_its_place_and_its_size(registered, s
     assert wall.name == "Wall"
     assert half.intensity[0] == pytest.approx(0.5 * track.intensity[0], rel=0.1)
     assert half.places[0, 0] > track.places[0, 0]
+    scene.flarewright.occlusion = False
+    assert tracks(registered)[1]["Plane"].intensity[0] == track.intensity[0]
 
 
 def test_a_glowing_ball_hides_its_own_back(registered, scene):
