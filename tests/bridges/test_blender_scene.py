@@ -76,6 +76,18 @@ def test_a_light_lies_where_blender_projects_it_in_every_frame(registered, scene
     assert np.abs((np.array(state["axis"]) - 0.5) * window.size_px).max() <= 0.5
 
 
+def test_cameras_bound_to_markers_follow_each_other(registered, scene):
+    scene.frame_end = 2
+    near, far = camera(scene, lens=20.0), camera(scene, lens=80.0)
+    for frame, eye in ((1, near), (2, far)):
+        scene.timeline_markers.new(f"F{frame}", frame=frame).camera = eye
+    lamp(scene, "POINT", (1.0, 0.0, -9.0))
+    export, found = tracks(registered)
+    assert [state["focal_mm"] for state in export.data["camera"]["frames"]] == [20.0, 80.0]
+    places = found["Lamp"].places[:, 0] - 0.5
+    assert places[1] / places[0] == pytest.approx(4.0)
+
+
 def test_a_sun_lies_where_a_far_point_of_its_direction_does(registered, scene):
     camera(scene, (0, 0, 0), (0.3, 0.1, 0.2), lens=40.0, shift_x=0.05)
     sun = lamp(scene, "SUN", (5, 6, 7), (2.9, 0.15, -0.1), angle=0.01, energy=3.0)
