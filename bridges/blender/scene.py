@@ -170,8 +170,8 @@ class _Sight:
         self._near = camera.data.clip_start
         self._ahead = unit(times(column(camera.matrix_world, 2), -1.0))
 
-    def sees(self, sample: Sample, only: Any = None) -> bool:
-        """Return whether nothing, or no part of one object, lies before a part of a light."""
+    def sees(self, sample: Sample, others: bool = True, own: Any = None) -> bool:
+        """Return whether nothing lies before a part of a light: no other object, and no part of its own."""
         start = self._near / max(dot(sample.direction, self._ahead), _LEAST_AHEAD)
         # a lamp inside a bulb or a glowing surface does not hide itself
         left = min(sample.distance * (1.0 - 1e-4) - start, 1e30)
@@ -184,7 +184,7 @@ class _Sight:
                 return True
             original = item.original
             unseen = original.flarewright.passes or original.hide_render or not original.visible_camera
-            if original == only or (only is None and not unseen):
+            if original == own or (others and not unseen):
                 return False
             passed = length(minus(tuple(place), origin)) + 1e-5 * max(sample.distance if left < 1e29 else 1.0, 1.0)
             origin, left = plus(origin, times(sample.direction, passed)), left - passed
@@ -280,8 +280,8 @@ def _add_glow(found: _Found, frame: int, sight: _Sight, paths: dict[Any, LightPa
         if level <= 0.0:
             continue
         for sample in mesh_samples(triangles, sight.place, _GLOW_RAYS * settings.rays):
-            # a surface hides its own back also where nothing else counts
-            if not sight.sees(sample, None if settings.occlusion else found.item.original):
+            # a surface hides its own back whatever else counts
+            if not sight.sees(sample, settings.occlusion, found.item.original):
                 continue
             rgb = plus(rgb, times(radiance, sample.irradiance))
             spot = plus(sight.place, times(sample.direction, sample.distance))

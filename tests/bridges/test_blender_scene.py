@@ -241,8 +241,10 @@ def test_a_glowing_ball_hides_its_own_back(registered, scene):
     ball = bpy.context.object
     material(ball, "ShaderNodeEmission", Strength=2.0)
     ball.flarewright.glows = True
-    track = tracks(registered)[1][ball.name]
-    assert track.intensity[0] == pytest.approx(2.0 * np.pi / 400.0, rel=0.03)
+    assert tracks(registered)[1][ball.name].intensity[0] == pytest.approx(2.0 * np.pi / 400.0, rel=0.03)
+    # also where it hides nothing else
+    ball.flarewright.passes, ball.visible_camera = True, False
+    assert tracks(registered)[1][ball.name].intensity[0] == pytest.approx(2.0 * np.pi / 400.0, rel=0.03)
 
 
 def test_what_has_no_lens_or_no_light_is_one_sentence(registered, scene):
