@@ -1,5 +1,6 @@
 """The nodes that add the flare to a render."""
 
+import re
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -150,16 +151,37 @@ def _fill_group(group: Any, image: Any, frames: tuple[int, int], offset_px: tupl
 
 def _pass_sockets(group: Any, image: Any, frames: tuple[int, int]) -> dict[str, Any]:
     """Return the sockets of the passes that add up to the flare, by name."""
+    node = _image_node(group, image, frames, 0)
+    found = {socket.name: socket for socket in node.outputs if socket.enabled and socket.name != "Alpha"}
+    # in Blender 4 the parts of a file are layers, one a node; in Blender 5 they are outputs of one node
+    layers = [layer for layer in _layers(node) if _is_pass(layer)]
+    for k, layer in enumerate(layers):
+        each = node if k == 0 else _image_node(group, image, frames, k)
+        each.layer = layer
+        found[layer] = each.outputs[0]
+    passes = {name: socket for name, socket in found.items() if _is_pass(name)}
+    # a file with the beauty alone has one unnamed picture
+    return passes or {"beauty": next(iter(found.values()))}
+
+
+def _image_node(group: Any, image: Any, frames: tuple[int, int], row: int) -> Any:
     node = group.nodes.new("CompositorNodeImage")
-    node.image, node.location = image, (-600.0, -200.0)
+    node.image, node.location = image, (-600.0, -200.0 - 350.0 * row)
     # the number in a file's name is that of the scene's frame
     node.frame_start, node.frame_offset = frames[0], frames[0] - 1
     node.frame_duration = frames[1] - frames[0] + 1
     node.use_auto_refresh = True
-    found = {socket.name: socket for socket in node.outputs if socket.enabled and socket.name != "Alpha"}
-    passes = {name: socket for name, socket in found.items() if _is_pass(name)}
-    # a file with the beauty alone has one unnamed picture
-    return passes or {"beauty": next(iter(found.values()))}
+    return node
+
+
+def _layers(node: Any) -> list[str]:
+    """Return the layers of an image node; Blender lists them only for a name that is none of them."""
+    if node.has_layers:
+        try:
+            node.layer = "?"
+        except TypeError as error:
+            return re.findall(r"'([^']*)'", str(error).rpartition("not found in")[2])
+    return []
 
 
 def _is_pass(name: str) -> bool:

@@ -119,12 +119,16 @@ def _suggest_lenses(settings: Any, context: Any, text: str) -> list[str]:
     return [name for name in _State.lenses if text.lower() in name]
 
 
+# the module of Blender 4.2 crashes at its end after a property with such suggestions
+_SUGGESTIONS = {"search": _suggest_lenses, "search_options": {"SUGGESTION"}} if bpy.app.version >= (5, 0, 0) else {}
+
+
 class FlarewrightSettings(bpy.types.PropertyGroup):
     """Settings of a scene."""
 
     __annotations__ = {
         "lens": bpy.props.StringProperty(
-            name="Lens", default="takumar-50-f1.4", search=_suggest_lenses, search_options={"SUGGESTION"},
+            name="Lens", default="takumar-50-f1.4", **_SUGGESTIONS,
             description="A lens of Flarewright or of your library, or the path of a lens file",
         ),
         "f_number": bpy.props.FloatProperty(

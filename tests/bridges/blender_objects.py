@@ -1,6 +1,7 @@
 """Objects of Blender for tests."""
 
 import bpy
+import pytest
 
 
 def added(scene, name, data, place=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0)):
@@ -20,6 +21,9 @@ def camera(scene, place=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0), **values):
 
 def lamp(scene, kind, place=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0), name="Lamp", **values):
     data = bpy.data.lights.new(name, kind)
+    lacking = [key for key in values if not hasattr(data, key)]
+    if lacking:
+        pytest.skip(f"lamps of Blender {bpy.app.version_string} have no {lacking[0]}")
     for key, value in values.items():
         setattr(data, key, value)
     return added(scene, name, data, place, turn)

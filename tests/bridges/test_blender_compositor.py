@@ -91,10 +91,11 @@ def test_the_flare_is_added_in_step_and_on_its_light(registered, scene, tmp_path
         assert star.sum() == pytest.approx(without[k][..., :3].sum(), rel=0.08)
     # a gain of one stop doubles a pass, and a second call keeps it
     scene.render.use_compositing = True
-    node = next(each for each in scene.compositing_node_group.nodes if each.label == "Flarewright")
+    tree = registered.compositor._compositor_tree(scene)[0]
+    node = next(each for each in tree.nodes if each.label == "Flarewright")
     node.inputs["ghosts"].default_value = 1.0
     assert bpy.ops.flarewright.composite() == {"FINISHED"}
-    assert [each.label for each in scene.compositing_node_group.nodes].count("Flarewright") == 1
+    assert [each.label for each in tree.nodes].count("Flarewright") == 1
     doubled = pictures(scene, tmp_path, [1002])[0][..., :3] - with_flare[1][..., :3]
     ghosts = flare(tmp_path, 1002)["ghosts"]
     # pixels of the ball itself are rounded to its light
