@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from conftest import FOLDER
 from flarewright.io.tracks.numbers import MOST_FRAMES, MOST_TRACKS
 from flarewright.io.tracks.scene_json import read_scene
 
+FOLDER = Path(__file__).parents[2] / "bridges" / "blender"
 ROOT = FOLDER.parents[1]
 EYE = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
 LAMP = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -5.0], [0, 0, 0, 1]]

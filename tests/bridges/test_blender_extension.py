@@ -11,8 +11,6 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the wheel of Blender: docs/blender.md")
 
-from conftest import FOLDER  # noqa: E402
-
 pytestmark = pytest.mark.blender
 
 INSTALL = """
@@ -29,8 +27,8 @@ print("OFF", not hasattr(bpy.types.Scene, "flarewright"))
 """
 
 
-def test_blender_finds_the_file_valid_installs_it_and_reads_its_preferences(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(FOLDER.parents[1] / "tools"))
+def test_blender_finds_the_file_valid_installs_it_and_reads_its_preferences(addon, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(addon.__file__).parents[2] / "tools"))
     from blender_addon import pack
 
     pack(tmp_path / "f.zip")
