@@ -7,7 +7,7 @@ import subprocess
 import time
 from collections.abc import Generator
 from contextlib import suppress
-from typing import Any
+from typing import Any, ClassVar
 
 import bpy
 
@@ -20,11 +20,11 @@ from .scene import Export, read_scene, shutter_deg
 
 
 class _State:
-    """What runs in this session, and what the panels show."""
+    """What runs in this session, and what the panels show; lenses have a focal length in mm."""
 
     job: Job | None = None
     program: Running | None = None
-    lenses: tuple[str, ...] = ()
+    lenses: ClassVar[dict[str, float]] = {}
 
 
 def program_words() -> str:
@@ -336,7 +336,7 @@ class FlarewrightCheck(bpy.types.Operator):
                 subprocess.run([*program, *words], capture_output=True, text=True, timeout=120, check=True).stdout
                 for words in (["--version"], ["library", "search", "--json"])
             )
-            _State.lenses = tuple(lens["name"] for lens in json.loads(lenses)["lenses"])
+            _State.lenses = {lens["name"]: float(lens["efl_mm"] or 0.0) for lens in json.loads(lenses)["lenses"]}
         except FlareError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -345,6 +345,16 @@ class FlarewrightCheck(bpy.types.Operator):
             return {"CANCELLED"}
         self.report({"INFO"}, f"{version.strip()}, {len(_State.lenses)} lenses")
         return {"FINISHED"}
+
+
+def _focal_words(scene: Any) -> str:
+    """Return a sentence on a lens that is much longer or shorter than the camera's; empty for others."""
+    focal = _State.lenses.get(scene.flarewright.lens.strip())
+    camera = scene.camera
+    if not focal or camera is None or camera.type != "CAMERA":
+        return ""
+    own = camera.data.lens
+    return f"the lens has {focal:.0f} mm, the camera {own:.0f} mm" if not 0.8 < focal / own < 1.25 else ""
 
 
 class FlarewrightPanel(bpy.types.Panel):
@@ -361,7 +371,11 @@ class FlarewrightPanel(bpy.types.Panel):
         """Draw settings and commands."""
         layout, settings = self.layout, context.scene.flarewright
         layout.use_property_split = True
-        for name in ("lens", "f_number", "quality", "collection", "occlusion"):
+        layout.prop(settings, "lens")
+        words = _focal_words(context.scene)
+        if words:
+            layout.label(text=words, icon="INFO")
+        for name in ("f_number", "quality", "collection", "occlusion"):
             layout.prop(settings, name)
         rays = layout.row()
         rays.active = settings.occlusion

@@ -214,7 +214,8 @@ def _lamp(data: Any, matrix: Matrix, name: str, remarks: dict[str, None]) -> tup
     colour: Vector = tuple(data.color)
     if getattr(data, "use_temperature", False):
         colour = _product(colour, tuple(data.temperature_color))
-    if data.use_nodes and data.node_tree is not None:
+    # the switch is expected to go with Blender 6
+    if getattr(data, "use_nodes", True) and data.node_tree is not None:
         glow = _emission(data.node_tree)
         if glow is None:
             remarks[f"the nodes of {name} are more than an Emission with fixed values, so they are left out"] = None
