@@ -182,7 +182,8 @@ class Running:
             return
         self._signal(signal.SIGINT if os.name == "posix" else getattr(signal, "CTRL_BREAK_EVENT", signal.SIGTERM))
         try:
-            self._process.wait(10.0)
+            # a frame that is being written is finished; a program that ignores the signal is not waited for
+            self._process.wait(5.0)
         except subprocess.TimeoutExpired:
             self._signal(getattr(signal, "SIGKILL", signal.SIGTERM))
             self._process.wait(10.0)
