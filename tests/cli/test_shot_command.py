@@ -161,3 +161,14 @@ def test_a_cluster_that_cannot_be_used_is_one_sentence(place, capsys, words, sai
     assert said in err
     assert len(err.strip().splitlines()) == 1
     assert [path.name for path in place.iterdir()] == ["p.toml"]
+
+
+def test_radiances_are_irradiances_times_the_factor_of_the_lens(place, capsys):
+    for name, flag in (("e", "--float"), ("l", "--radiance")):
+        assert run(f"shot --project p.toml --frames 1001 -o {name}.####.exr --processes 1 {flag}".split()) == 0
+    irradiance, radiance = (read_exr(place / f"{name}.1001.exr").layers[0].pixels for name in "el")
+    bright = irradiance > 0.1 * irradiance.max()
+    # 4 N^2 / (pi T) of a triplet at f/16, which transmits most of the light
+    factors = radiance[bright] / irradiance[bright]
+    assert factors == pytest.approx(np.full(factors.shape, factors.mean()), rel=2e-3)
+    assert 1.0 < factors.mean() / (4 * 16.0**2 / np.pi) < 1.5
