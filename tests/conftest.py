@@ -40,14 +40,14 @@ os.environ.setdefault("FLAREWRIGHT_HELPER", "1")
 
 
 @contextmanager
-def _locked(path):
-    """Hold a file lock, which the system releases when the process ends; without `fcntl` hold none."""
+def _locked(path, mode="ab"):
+    """Hold a lock on a file, which the system releases when the process ends; without `fcntl` hold none."""
     try:
         import fcntl
     except ImportError:
         yield
         return
-    with path.open("ab") as stream:
+    with path.open(mode) as stream:
         fcntl.flock(stream, fcntl.LOCK_EX)
         yield
 
@@ -77,6 +77,15 @@ def pytest_configure(config):
             return compile_alone(self, sig)
 
     Dispatcher.compile = compile_once
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector):
+    """Let one process rewrite the assertions of a file of tests; the others wait for it and load its byte code."""
+    if not isinstance(collector, pytest.Module) or sys.dont_write_bytecode:
+        return (yield)
+    with _locked(collector.path, "rb"):
+        return (yield)
 
 
 def pytest_collection_finish():

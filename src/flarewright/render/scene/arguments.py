@@ -15,6 +15,7 @@ from ...model import Lens, Project
 if TYPE_CHECKING:
     from ...model import (  # fmt: skip
         Art,
+        Backplate,
         Camera,
         Coating,
         CoatingChoice,
@@ -58,6 +59,7 @@ class Settings(TypedDict, total=False):
     design: Design | None
     curves: Sequence[ProjectCurve]
     timeline: Timeline
+    plate: Backplate | None
 
 
 def project_of(given: Project | Lens | str | PathLike[str], **settings: Unpack[Settings]) -> Project:
