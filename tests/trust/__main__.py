@@ -15,7 +15,6 @@ from collections.abc import Callable
 from .kinds import KINDS, SLOW
 from .worker import Tried, Worker
 
-
 WARM_MINUTES = 5.0
 """From this length on all kernels are compiled first, so that the limits of time judge the work itself."""
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from flarewright.model import Art, Camera, Dirt, Iris, Light, Output, Project, Quality, Starburst
 from flarewright.optics.diffraction.fraunhofer import Pattern, Soil, pupil_pattern
@@ -35,7 +36,7 @@ SOILS = {
 
 def energy(terms):
     """Return the integral over the plane of a veil's terms."""
-    return sum(2 * math.pi * np.trapezoid(t.radial * t.s**2, np.log(t.s)) * t.angular.mean() for t in terms)
+    return sum(2 * math.pi * trapezoid(t.radial * t.s**2, np.log(t.s)) * t.angular.mean() for t in terms)
 
 
 @pytest.mark.parametrize("name", ["dust", "scratches"])

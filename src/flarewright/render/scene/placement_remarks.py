@@ -95,4 +95,4 @@ def veil_remarks(ghosts: Layer) -> list[str]:
     median, bright = np.percentile(light, [50.0, 99.0])
     if not median > 0.0 or bright > UNIFORM_RATIO * median:
         return []
-    return ["the ghosts are almost one even veil over the picture: stop down (--fstop) or move the light to see shapes"]
+    return ["the ghosts are almost one even veil over the picture: stop down or move the light to see shapes"]
