@@ -2,6 +2,8 @@
 
 import json
 import signal
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -296,6 +298,21 @@ def test_an_ended_and_a_killed_search_resume_to_the_same_lenses(folder, plain, r
     assert not list((folder / "killed").glob("lens-*"))
     assert run(["design", "resume", "killed", *SEARCH]) == 0
     assert made(folder / "killed") == whole
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
+def test_a_signal_after_the_work_ends_the_process_without_a_word():
+    code = (
+        "import atexit, os, signal, sys\n"
+        "from flarewright.cli.app import main\n"
+        "atexit.register(lambda: os.kill(os.getpid(), signal.SIGTERM))\n"
+        "sys.argv = ['flarewright', '--version']\n"
+        "main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == -signal.SIGTERM
+    assert done.stderr == ""
+    assert "flarewright" in done.stdout
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])

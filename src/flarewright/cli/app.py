@@ -15,7 +15,7 @@ from .. import __version__
 from ..errors import FlarewrightError
 from ..kernels.jit.warmup_processes import head_start
 from . import dataset, edit, gallery, looks, warm_up
-from .common import end_as_interrupted
+from .common import end_as_interrupted, end_at_once
 from .design import benchmark as design_benchmark
 from .design import colors as design_colors
 from .design import edit as design_edit
@@ -161,7 +161,11 @@ def main() -> None:
     # imported objects live until the end, so exclude them from garbage collection
     gc.set_threshold(100_000)
     end_as_interrupted()
-    sys.exit(run(sys.argv[1:]))
+    try:
+        code = run(sys.argv[1:])
+    finally:
+        end_at_once()
+    sys.exit(code)
 
 
 def run(arguments: Sequence[str]) -> int:

@@ -380,6 +380,12 @@ def end_as_interrupted() -> None:
         signal.signal(one, signal.default_int_handler)
 
 
+def end_at_once() -> None:
+    """Let signals end this process without a word: its work is done, and Python would print where it was at its exit."""
+    for one in ending_signals():
+        signal.signal(one, signal.SIG_DFL)
+
+
 @contextmanager
 def stop_on_interrupt() -> Iterator[Callable[[], bool]]:
     """Convert Ctrl-C, SIGTERM and SIGHUP to a flag that a search checks after each round."""
