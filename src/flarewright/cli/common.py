@@ -381,7 +381,7 @@ def end_as_interrupted() -> None:
 
 
 def end_at_once() -> None:
-    """Let signals end this process without a word: its work is done, and Python would print where it was at its exit."""
+    """Let signals end this process without a word: its work is done, and Python would print where its exit was."""
     for one in ending_signals():
         signal.signal(one, signal.SIG_DFL)
 
