@@ -1,5 +1,7 @@
 """EXR files: round trips, a first part that every program opens, atomic writing."""
 
+from pathlib import Path
+
 import numpy as np
 import OpenEXR
 import pytest
@@ -284,4 +286,19 @@ def test_dwaa_files_are_smaller(tmp_path):
 def test_dwaa_of_32_bits_is_refused(tmp_path):
     with pytest.raises(FlarewrightError, match="compression dwaa keeps 16 bits"):
         write_exr(tmp_path / "a.exr", [smooth("beauty")], SIZE, pixel_type="float", compression="dwaa")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_compressor_without_memory_is_a_lack_of_memory_and_leaves_no_file(tmp_path, monkeypatch):
+    class Full:
+        def __init__(self, parts):
+            pass
+
+        def write(self, name):
+            Path(name).write_bytes(b"begun")
+            raise RuntimeError(f'Failed to write pixel data to image file "{name}". unable to run compression routine.')
+
+    monkeypatch.setattr(OpenEXR, "File", Full)
+    with pytest.raises(MemoryError):
+        write_exr(tmp_path / "a.exr", [Layer("a", np.ones((4, 4, 3), np.float32), (0, 0, 4, 4))], (4, 4))
     assert list(tmp_path.iterdir()) == []

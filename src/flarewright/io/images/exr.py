@@ -221,7 +221,7 @@ def _joined(parts: list[Any]) -> Any:
 
 
 def _write_parts(parts: list[Any], temporary: Path, path: str | PathLike[str]) -> None:
-    """Write a temporary file for a path; raises OSError with the library's reason."""
+    """Write a temporary file for a path; raises OSError with the library's reason, or MemoryError."""
     import OpenEXR
 
     # the library compresses on one thread by default; its oldest releases have no setting for it
@@ -233,6 +233,9 @@ def _write_parts(parts: list[Any], temporary: Path, path: str | PathLike[str]) -
         # The library raises RuntimeError; with a valid header the only cause is that the file cannot be written. The
         # message has the temporary name, then the reason.
         message = str(error).rstrip(".")
+        if "compression routine" in message:
+            # a compressor fails only where it cannot allocate its buffer
+            raise MemoryError from error
         reason = message.partition(f'"{temporary}". ')[2]
         raise OSError(reason or message.replace(str(temporary), str(path))) from error
     if shutil.disk_usage(temporary.parent).free < _SPARE:
