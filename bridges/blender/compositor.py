@@ -175,7 +175,7 @@ def _image_node(group: Any, image: Any, frames: tuple[int, int], row: int) -> An
 
 
 def _layers(node: Any) -> list[str]:
-    """Return the layers of an image node; Blender lists them only for a name that is none of them."""
+    """Return the layers of an image node; Blender lists them only for an unknown name."""
     if node.has_layers:
         try:
             node.layer = "?"

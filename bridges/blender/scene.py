@@ -171,7 +171,7 @@ class _Sight:
         self._ahead = unit(times(column(camera.matrix_world, 2), -1.0))
 
     def sees(self, sample: Sample, others: bool = True, own: Any = None) -> bool:
-        """Return whether nothing lies before a part of a light: no other object, and no part of its own."""
+        """Return whether nothing lies before a part of a light: no other object, and no part of the source itself."""
         start = self._near / max(dot(sample.direction, self._ahead), _LEAST_AHEAD)
         # a lamp inside a bulb or a glowing surface does not hide itself
         left = min(sample.distance * (1.0 - 1e-4) - start, 1e30)
@@ -281,7 +281,7 @@ def _add_glow(found: _Found, frame: int, sight: _Sight, paths: dict[Any, LightPa
         if level <= 0.0:
             continue
         for sample in mesh_samples(triangles, sight.place, _GLOW_RAYS * settings.rays):
-            # a surface hides its own back whatever else counts
+            # a surface hides its own back even where other objects hide nothing
             if not sight.sees(sample, settings.occlusion, found.item.original):
                 continue
             rgb = plus(rgb, times(radiance, sample.irradiance))

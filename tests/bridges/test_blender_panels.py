@@ -101,7 +101,7 @@ def window():
     return SimpleNamespace(window_manager=manager, window=None, screen=None), timers
 
 
-def begun(registered, work):
+def started(registered, work):
     steps = registered.panels._Steps
     operator = Operator(said=[], work=lambda context: work)
     operator._result = lambda job: steps._result(operator, job)
@@ -121,7 +121,7 @@ def test_work_beside_the_window_takes_steps_with_the_timer_and_ends(registered, 
         yield "waits"
         return ["done"]
 
-    operator, event, timers = begun(registered, work())
+    operator, event, timers = started(registered, work())
     assert event("MOUSEMOVE") == {"PASS_THROUGH"}
     assert registered.panels._State.job.words == ""
     results = [event("TIMER"), event("TIMER")]
@@ -141,12 +141,12 @@ def test_escape_stops_the_work_and_so_does_another_file(registered, scene):
         finally:
             closed.append(True)
 
-    operator, event, timers = begun(registered, work())
+    operator, event, timers = started(registered, work())
     assert event("TIMER") == {"PASS_THROUGH"}
     assert event("ESC") == {"CANCELLED"}
     assert operator.said == [("WARNING", "Flarewright was cancelled; finished frames are kept")]
     assert (closed, timers) == ([True], [])
-    operator, event, _ = begun(registered, work())
+    operator, event, _ = started(registered, work())
     event("TIMER")
     registered.panels._Steps.cancel(operator, None)
     assert closed == [True, True]
@@ -158,7 +158,7 @@ def test_a_bug_in_the_work_leaves_no_timer_and_no_job(registered, scene):
         yield "begins"
         raise ValueError("a bug")
 
-    _, event, timers = begun(registered, work())
+    _, event, timers = started(registered, work())
     with pytest.raises(ValueError, match="a bug"):
         event("TIMER")
     assert timers == []

@@ -1,6 +1,7 @@
 """Light paths, occluders, chosen pictures, and two editors of one project; without a browser."""
 
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +10,6 @@ from flarewright.editor.commands.registry import done
 from flarewright.editor.preview.display_image import png
 from flarewright.editor.preview.render_picture import pictured
 from flarewright.editor.server.uploads import take_in
-from flarewright.editor.session import files
 from flarewright.editor.session import session as session_module
 from flarewright.editor.session.history import before_mask
 from flarewright.editor.session.session import begin
@@ -221,7 +221,7 @@ def test_what_others_save_while_this_is_written_is_not_overwritten(tmp_path, mon
     session.do("set_iris", {"values": {"blades": 9}})
     # changed between the first check and the last
     with monkeypatch.context() as patch:
-        after(patch, files, "_write_bytes", 1, lambda: path.write_text(theirs))
+        after(patch, Path, "write_bytes", 1, lambda: path.write_text(theirs))
         with pytest.raises(ProjectError, match=r"shot.toml was changed by another program since .* save again"):
             session.save(str(path))
     assert path.read_text() == theirs
@@ -229,7 +229,7 @@ def test_what_others_save_while_this_is_written_is_not_overwritten(tmp_path, mon
     session.save(str(path))
     assert read_project(path).iris.blades == 9
     # a new file appears, before the last check and right after it
-    for name, module, call, function in (("a", files, 1, "_write_bytes"), ("b", session_module, 2, "stamp_of")):
+    for name, module, call, function in (("a", Path, 1, "write_bytes"), ("b", session_module, 2, "stamp_of")):
         new = tmp_path / f"{name}.toml"
         with monkeypatch.context() as patch:
             after(patch, module, function, call, lambda new=new: new.write_text(theirs))

@@ -178,7 +178,7 @@ def test_frames_of_mixed_sizes_and_gaps_are_refused(plates, tmp_path):
     for k in (0, 1, 3):
         write(tmp_path / f"p.{1001 + k}.exr", picture(k)[: 36 if k < 1 else 30])
     with pytest.raises(FlarewrightError, match="lacks frame 1003; there are 1001-1002,1004"):
-        plate_frames(settings(tmp_path), None, 1)
+        plate_frames(settings(tmp_path), None)
     with pytest.raises(
         FlarewrightError, match=r"p\.1002\.exr has 64x30 pixels, the first frame 64x36; give frames of one"
     ):

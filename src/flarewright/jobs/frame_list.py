@@ -168,6 +168,15 @@ class FramePattern:
         # other files can have as many digits
         return tuple(sorted(number for number in numbers if self.path(number).name in {m[0] for m in matches if m}))
 
+    def found(self) -> tuple[int, ...]:
+        """Return the frames as `on_disk` does; raises ProjectError if there is none."""
+        there = self.on_disk()
+        if not there:
+            raise ProjectError(
+                f"no file is named {self.text}; check the folder, and the number of digits (#### or %04d)"
+            )
+        return there
+
     def check(self, frames: Sequence[int]) -> None:
         """Raise ProjectError if several frames would go to one file."""
         if len(frames) > 1 and not self.numbered:

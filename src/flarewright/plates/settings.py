@@ -67,7 +67,7 @@ class PlateSettings:
     source : SourceKind or None
         Brightness of a lamp that is known; needs `white`.
     first : int
-        Number of the first frame of a film. A shot sets that of the frame at 0 s.
+        Number of a single picture, or of the first frame of a film. A shot sets that of the frame at 0 s.
     """
 
     files: str

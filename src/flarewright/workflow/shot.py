@@ -164,8 +164,7 @@ def shot(
     from .shot_frame import ShotPlan
 
     _check(shutter_deg, subframes)
-    own = project.plate
-    if radiance and (plate is not None or (own is not None and own.lit)):
+    if radiance and (plate is not None or project.lit_by_plate):
         raise ProjectError("layers over a plate have its unit already; omit --radiance")
     processes = workers_of(cluster, processes, threads)
     if plate is not None:
@@ -366,7 +365,7 @@ def shot_frames(
         from .plates.plate_files import plate_frames
 
         plate = replace(plate, first=project.timeline.start)
-        return plate_frames(plate, parsed_frames(frames), project.timeline.start), []
+        return plate_frames(plate, parsed_frames(frames)), []
     timeline, long_s = project.timeline, length_s(project)
     last = timeline.start + ceil(long_s * float(frame_rate(timeline.fps)) - 1e-6)
     if frames is None:

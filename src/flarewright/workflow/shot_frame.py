@@ -89,8 +89,7 @@ class ShotPlan:
 
         1 over a plate and for radiances: layers add to the picture of the scene as they are.
         """
-        own = self.project.plate
-        lit = self.plate is not None or (own is not None and own.lit)
+        lit = self.plate is not None or self.project.lit_by_plate
         if lit or self.radiance or self.project.output.pixel_type == "float":
             return 1.0
         return half_scale(peak_intensity(self.project))

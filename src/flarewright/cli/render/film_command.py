@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...errors import ProjectError
-from ..common import check_free, one_bar, print_json, print_remarks
+from ..common import check_free, check_rate, one_bar, print_json, print_remarks
 from ..progress_lines import print_line
 
 if TYPE_CHECKING:
@@ -50,8 +49,7 @@ def film(
 
     For shots that several machines have drawn; `shot --movie` does the same at the end of its work.
     """
-    if fps is not None and not 0.0 < fps <= 1000.0:
-        raise ProjectError(f"--fps {fps:g} is no frame rate: give a number above 0, such as 24 or 23.976")
+    check_rate(fps)
     from ...workflow.films.assembly import assemble_film
     from ...workflow.films.look import check_look
 

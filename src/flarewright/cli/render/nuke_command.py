@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ...errors import ProjectError
-from ..common import check_free, check_place, print_json, print_remarks, write_text
+from ..common import check_free, check_place, check_rate, print_json, print_remarks, write_text
 
 EPILOG = (
     "Examples:\n\nflarewright nuke-script 'flare.####.exr' --plate 'plate.####.exr' -o comp.nk\n\n"
@@ -48,8 +48,7 @@ def nuke_script(
         for flag, value in (("--plate", plate), ("--frames", frames), ("--fps", fps)):
             if value is not None:
                 raise ProjectError(f"a gizmo has inputs for flare and plate: leave {flag} out, or write a .nk file")
-    if fps is not None and not 0.0 < fps <= 1000.0:
-        raise ProjectError(f"--fps {fps:g} is no frame rate: give a number above 0, such as 24 or 23.976")
+    check_rate(fps)
     from ...jobs.frame_list import parse_frames
     from ...workflow.keyframes import frame_rate
     from ...workflow.nuke_script import nuke_script as script_of

@@ -164,7 +164,7 @@ def _other_rate(options: ShotOptions, plate: PlateSettings, project: Project) ->
 
     if options.project is None or options.fps is not None:
         return []
-    own = first_picture(plate, parsed_frames(options.frames), project.timeline.start).fps
+    own = first_picture(replace(plate, first=project.timeline.start), parsed_frames(options.frames)).fps
     if own is None or frame_rate(float(own)) == frame_rate(project.timeline.fps):
         return []
     return [
@@ -194,7 +194,7 @@ def _over_plate(options: ShotOptions, plate: PlateSettings) -> tuple[ShotOptions
     from ...workflow.plates.plate_files import first_picture
     from ...workflow.shot import parsed_frames
 
-    first = first_picture(plate, parsed_frames(options.frames), options.start or 1)
+    first = first_picture(replace(plate, first=options.start or 1), parsed_frames(options.frames))
     width, height = first.size_px
     _check_frame(options, first.size_px)
     remarks = []

@@ -67,7 +67,7 @@ def sources(options: SourcesOptions) -> None:
 
     settings = plate_settings(options.plate, options)
     assert settings is not None
-    frames = plate_frames(settings, parsed_frames(options.frames), 1)
+    frames = plate_frames(settings, parsed_frames(options.frames))
     marked = _marked_pattern(options.marked, settings, frames)
     _check_table(options.table)
     kept = _kept(options)

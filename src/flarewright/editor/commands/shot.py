@@ -44,8 +44,7 @@ def add_light(project: Project) -> Project:
     taken = {light.name for light in project.lights}
     name = next(name for k in count(len(project.lights) + 1) if (name := f"light {k}") not in taken)
     # in the unit of a plate, 1 may be a million times a lamp
-    lit = project.plate is not None and project.plate.lit
-    intensity = project.lights[-1].intensity if lit else 1.0
+    intensity = project.lights[-1].intensity if project.lit_by_plate else 1.0
     new = Light(name=name, field_deg=(-x, y), spectrum=BlackBody(temperature_k=3200.0), intensity=intensity)
     return _with(project, lights=(*project.lights, new))
 

@@ -7,7 +7,6 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import FlarewrightError
 from ...render.image.aces_view import aces_available
 from ...render.image.display import view
 from ...typing import Pixels
@@ -79,4 +78,4 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
     return buffer.getvalue()
 
 
-__all__ = ["FlarewrightError", "aces_available", "jpeg", "pixels_of", "png"]
+__all__ = ["aces_available", "jpeg", "pixels_of", "png"]

@@ -33,7 +33,7 @@ SLOW_S, FAST_S = 0.04, 0.024
 # number of consecutive slow or fast pictures before the size changes, to ignore single delays
 STREAK = 4
 QUALITY = 80
-# from so many lights on, a drag draws only the one that moves
+# from this number of lights on, a drag draws only the one that moves
 FEW_LIGHTS = 3
 # the target picture is secondary: most of the time is for the picture itself
 TARGET_SCALE = SCALES[2]

@@ -116,8 +116,7 @@ def staged(
 
 def pointlike(project: Project) -> Project:
     """Return a project without area lights, if it has many: the blur of their ghosts takes most of the time."""
-    wide = [light.diameter_deg > 0.0 or light.shape is not None for light in project.lights]
-    if sum(wide) <= MOST_WIDE_LIGHTS:
+    if sum(light.extended for light in project.lights) <= MOST_WIDE_LIGHTS:
         return project
     lights = tuple(light.replace(diameter_deg=0.0, shape=None) for light in project.lights)
     found: Project = project.replace(lights=lights)
@@ -313,8 +312,7 @@ def pictured(project: Project) -> Project:
 
     Of a plate only whether the lights have its unit counts, which decides how the flare is exposed.
     """
-    lit = project.plate is not None and project.plate.lit
-    found: Project = still(project).replace(design=None, plate=_ANY_LIT if lit else None)
+    found: Project = still(project).replace(design=None, plate=_ANY_LIT if project.lit_by_plate else None)
     return found
 
 

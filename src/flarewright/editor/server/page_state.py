@@ -134,7 +134,7 @@ def _lens(project: Project, facts: dict[str, float], problem: str) -> dict[str, 
 def _lights(project: Project, round_lens: bool) -> list[dict[str, Any]]:
     """Return the lights; on a plate, for a lens that is not round, also where they are traced to."""
     found = [_light(project, k) for k in range(len(project.lights))]
-    if project.plate is None or not project.plate.lit or round_lens or is_measured(project):
+    if not project.lit_by_plate or round_lens or is_measured(project):
         return found
     # imports SciPy, which the editor does not need without a plate
     from ...workflow.plates.found_lights import traced_places

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ... import __version__
 from ...errors import FlarewrightError, LensError, OutputError, ProjectError
-from ...io.files.atomic_write import write_atomically
+from ...io.files.atomic_write import write_bytes_atomically
 from ...io.files.door import expanded, outside
 from ...io.files.file_kind import LENS_SUFFIXES, kind_of
 from ...io.files.text_file import read_toml
@@ -208,7 +208,7 @@ def imported(
     folder.mkdir(parents=True, exist_ok=True)
     # signs that stand for the number of a frame in other names
     path = folder / re.sub(r"[#$%]", "_", plain)
-    write_atomically(path, lambda temporary: _write_bytes(temporary, data))
+    write_bytes_atomically(path, data)
     if suffix in PICTURES:
         return Imported(picture=str(path))
     try:
@@ -234,10 +234,6 @@ def imported(
             words = f"{plain}: {words.replace(f'{folder}/', '')}; a dropped file comes alone, so use Open for this one"
         raise type(error)(words) from None
     return Imported(lens=opened.lens.replace(name=opened.lens.name or plain), remarks=opened.remarks)
-
-
-def _write_bytes(path: Path, data: bytes) -> None:
-    path.write_bytes(data)
 
 
 def project_path(text: str) -> Path:
@@ -286,7 +282,7 @@ def save_project(
         When a file exists there that must not be replaced.
     """
     data = project_text(project, folder=path.parent).encode()
-    write_atomically(path, lambda temporary: _write_bytes(temporary, data), look=look, replace=replace)
+    write_bytes_atomically(path, data, look=look, replace=replace)
     return _stamp(data)
 
 
@@ -320,7 +316,7 @@ def export_comp(project: Project, path: Path, progress: Progress | None = None) 
     from ...workflow.plates.found_lights import backplate_shot
     from ...workflow.plates.plate_frame import check_comp, write_comp
 
-    if project.plate is None or not project.plate.lit:
+    if not project.lit_by_plate:
         raise ProjectError("the comp needs the lights of a plate; drop a photograph on the page, and find its lights")
     plate = backplate_shot(project)
     project = project.replace(output=project.output.replace(layers="passes"))

@@ -134,7 +134,7 @@ class PlateFinder:
                 raise ProjectError("the plate was changed during the search, so no lights were placed; find them again")
             project, remarks = with_found_lights(self.session.project, found)
             self.session.put(project, "Find lights", placed=True)
-        wide = sum(light.shape is not None or light.diameter_deg > 0.0 for light in project.lights)
+        wide = sum(light.extended for light in project.lights)
         if wide > FEW_WIDE_LIGHTS:
             remarks += (
                 f"{wide} of them are area lights, whose ghosts take long: Points below makes small ones points",

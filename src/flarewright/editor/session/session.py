@@ -231,7 +231,7 @@ class Session:
 
 def _on_plate(before: Project, after: Project) -> Project:
     """Return a changed project whose lights stay where they are in its plate."""
-    if after.plate is None or not after.plate.lit:
+    if not after.lit_by_plate:
         return after
     # imports SciPy, which the editor does not need without a plate
     from ...workflow.plates.found_lights import kept_on_plate

@@ -76,13 +76,15 @@ def write_text_atomically(path: str | Path, text: str, *, newline: str | None = 
     write_atomically(path, write, replace=replace)
 
 
-def write_bytes_atomically(path: str | Path, data: bytes) -> None:
-    """Write a file of bytes; errors as of `write_atomically`."""
+def write_bytes_atomically(
+    path: str | Path, data: bytes, *, look: Callable[[], object] | None = None, replace: bool = True
+) -> None:
+    """Write a file of bytes; `look`, `replace` and errors as of `write_atomically`."""
 
     def write(temporary: Path) -> None:
         temporary.write_bytes(data)
 
-    write_atomically(path, write)
+    write_atomically(path, write, look=look, replace=replace)
 
 
 def _place(temporary: Path, target: Path, replace: bool) -> None:

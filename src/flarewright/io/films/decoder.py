@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 from ...errors import FileError, optional
 from ..files.door import outside, read_limit_bytes, refuse_claim, shown
 
-__all__ = ["READS", "av_module", "opened", "video_of"]
+__all__ = ["READS", "av_module", "exact_flags", "opened", "video_of"]
 
 READS = "give MP4, MOV, MKV, WebM, AVI or MXF, or an image sequence"
 """End of the message about a film that cannot be read."""
@@ -28,6 +28,12 @@ def av_module(path: Any) -> Any:
     # our sentence is the only one about a damaged film
     av.logging.set_level(None)
     return av
+
+
+def exact_flags(av: Any) -> Any:
+    """Return the flags with which FFmpeg rounds to the nearest code; a sharper filter would ring around lights."""
+    flags = av.video.reformatter.Interpolation
+    return flags.BILINEAR | flags.ACCURATE_RND | flags.FULL_CHR_H_INT | flags.FULL_CHR_H_INP | flags.BITEXACT
 
 
 @contextmanager
@@ -49,13 +55,13 @@ def opened(path: str) -> Iterator[Any]:
     """
     av = av_module(path)
     options = {"format_whitelist": _CONTAINERS, "protocol_whitelist": "none", "max_pixels": str(_most_pixels())}
-    with (
-        outside(path, "a film", remedy=READS) as file,
-        _plain(av),
-        _not_empty(file, path),
-        av.open(_Bytes(file), "r", options=options, metadata_errors="replace", buffer_size=_BUFFER_BYTES) as container,
-    ):
-        yield container
+    with outside(path, "a film", remedy=READS) as file, _plain(av):
+        if not file.read(1):
+            raise FileError(f"{shown(path)} is empty: a film was expected")
+        file.seek(0)
+        how = {"options": options, "metadata_errors": "replace", "buffer_size": _BUFFER_BYTES}
+        with av.open(_Bytes(file), "r", **how) as container:
+            yield container
 
 
 @contextmanager
@@ -89,14 +95,6 @@ class _Bytes:
     def seekable(self) -> bool:
         """Return True."""
         return True
-
-
-@contextmanager
-def _not_empty(file: BinaryIO, path: str) -> Iterator[None]:
-    if not file.read(1):
-        raise FileError(f"{shown(path)} is empty: a film was expected")
-    file.seek(0)
-    yield
 
 
 def _most_pixels() -> int:

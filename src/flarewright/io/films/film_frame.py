@@ -15,7 +15,7 @@ from ...errors import FileError, FlarewrightError
 from ..files.door import shown
 from ..images.plate_picture import PlatePicture
 from ..images.transfer import Transfer, white_of
-from .decoder import av_module, opened, video_of
+from .decoder import av_module, exact_flags, opened, video_of
 from .film_colour import linear_pixels
 from .film_file import Film, open_film
 from .film_time_code import time_code_after
@@ -98,14 +98,12 @@ def _read_as(film: Film) -> str:
 def _codes(frame: Any, film: Film) -> np.ndarray:
     """Return the codes of a frame with 16 bits, as of `film_colour.signal_of`; FFmpeg unpacks them."""
     av = av_module(film.path)
-    flags, ranges = av.video.reformatter.Interpolation, av.video.reformatter.ColorRange
+    ranges = av.video.reformatter.ColorRange
     # the same range on both sides: nothing is scaled
     same = ranges.JPEG if film.coding.full_range else ranges.MPEG
-    # a sharper filter would ring around lights
-    exact = flags.ACCURATE_RND | flags.FULL_CHR_H_INT | flags.FULL_CHR_H_INP | flags.BITEXACT
     how = {
         "src_color_range": same, "dst_color_range": same, "src_colorspace": 1, "dst_colorspace": 1, "threads": 1,
-        "interpolation": flags.BILINEAR | exact,
+        "interpolation": exact_flags(av),
     }  # fmt: skip
     if film.coding.matrix is None:
         # to these two FFmpeg only moves values; to others it goes by way of Y'CbCr
@@ -207,9 +205,7 @@ def _reached(following: Iterator[tuple[int, Any]], wanted: int) -> tuple[int, An
 
 
 def _key_between(film: Film, at: int, wanted: int) -> bool:
-    """Return whether decoding may begin later than at the next frame."""
-    if not len(film.times):
-        return False
+    """Return whether decoding may begin later than at the next frame; the film has times."""
     first, last = np.searchsorted(film.keys, (film.times[max(at, 0)], film.times[wanted]), side="right")
     # to seek costs more than the next frame
     return bool(last > first and wanted - at > 1)

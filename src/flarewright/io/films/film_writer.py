@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...errors import FileError, OutputError, optional
 from ..files.atomic_write import write_atomically
-from .decoder import opened
+from .decoder import exact_flags, opened
 
 __all__ = ["FILM_CODECS", "FilmCodec", "check_film_name", "comment_of", "join_films", "padded_size", "write_film"]
 
@@ -271,15 +271,13 @@ def _padded(picture: NDArray[Any], codec: FilmCodec) -> NDArray[Any]:
 def _frame(av: Any, picture: NDArray[Any], codec: FilmCodec, curve: int) -> Any:
     """Return a frame in the colours of the codec; FFmpeg converts with rounding to the nearest code."""
     names = av.video.reformatter
-    flags = names.Interpolation
-    exact = flags.ACCURATE_RND | flags.FULL_CHR_H_INT | flags.FULL_CHR_H_INP | flags.BITEXACT
     kind = "rgb24" if picture.dtype == np.uint8 else "rgb48le"
     frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format=kind).reformat(
         format=codec.pixels,
         src_color_range=names.ColorRange.JPEG,
         dst_color_range=names.ColorRange.MPEG,
         dst_colorspace=names.Colorspace.ITU709,
-        interpolation=flags.BILINEAR | exact,
+        interpolation=exact_flags(av),
         threads=1,
     )
     frame.colorspace = frame.color_primaries = _BT709

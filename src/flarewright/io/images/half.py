@@ -68,7 +68,7 @@ def exr_scale(project: Project) -> float:
         1 for `pixel_type` "float", and over a plate whose lights are the project's: layers then add to it as they are.
         Else `half_scale` of the brightest light.
     """
-    if project.output.pixel_type == "float" or (project.plate is not None and project.plate.lit):
+    if project.output.pixel_type == "float" or project.lit_by_plate:
         return 1.0
     return half_scale(max(light.intensity for light in project.lights))
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
+from ...model.project.backplate import Transfer
 from ...typing import Pixels
 from .picture import decode_srgb
 
 __all__ = ["HDR_WHITE_CD_M2", "TRANSFERS", "Transfer", "decoded", "encoded_rec709", "white_of"]
 
-Transfer = Literal["srgb", "linear", "rec709", "gamma22", "gamma28", "pq", "hlg"]
-"""What the codes of a file mean: display codes of sRGB, linear values, the codes of a video camera, ..."""
 TRANSFERS: tuple[Transfer, ...] = get_args(Transfer)
 
 HDR_WHITE_CD_M2 = 203.0

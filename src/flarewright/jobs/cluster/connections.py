@@ -110,8 +110,7 @@ class LocalConnection:
         self.client = distributed.Client(self._cluster, security=security, set_as_default=False)
         start = LocalWorker(self._cluster.scheduler_address, security, 0, self._scratch.name)
         self._workers = LocalWorkers(start, announce)
-        if find_spec("bokeh") is not None:
-            announce(f"dashboard of the cluster: {self._cluster.dashboard_link}")
+        _announce_dashboard(self._cluster, announce)
 
     def grow(self, workers: int, threads: int | None) -> None:
         """Start worker processes until there are as many."""
@@ -180,7 +179,22 @@ class RunningConnection:
 
     def watch(self) -> None:
         """Raise an error if the scheduler is gone, or has no worker for minutes."""
-        self._alone_since = _check_alive(self.client, self._address, self._alone_since, _NO_WORKER_S)
+        if self.client.status not in ("running", "connecting"):
+            raise FlarewrightError(
+                f"the connection with the cluster at {self._address} is lost; finished work is kept: repeat the command"
+            )
+        # a connection that breaks meanwhile is found by its state later
+        with suppress(Exception):
+            if self.client.status == "running" and self.client.nthreads():
+                self._alone_since = None
+                return
+        now = time.monotonic()
+        self._alone_since = now if self._alone_since is None else self._alone_since
+        if now - self._alone_since > _NO_WORKER_S:
+            raise FlarewrightError(
+                f"the cluster at {self._address} has had no workers for {_NO_WORKER_S:.0f} s; finished work is kept: "
+                "start workers, and repeat the command"
+            )
 
     def note_result(self) -> None:
         """Do nothing: a result proves nothing about other workers."""
@@ -225,8 +239,7 @@ class SlurmConnection:
             self._keys.cleanup()
             raise FlarewrightError(f"{file}: these settings cannot be used{_reason(error)}; check them") from None
         self.client = distributed.Client(self._cluster, security=security, set_as_default=False)
-        if find_spec("bokeh") is not None:
-            announce(f"dashboard of the cluster: {self._cluster.dashboard_link}")
+        _announce_dashboard(self._cluster, announce)
         try:
             _check_accepted(self._cluster.job_script(), file)
             self._cluster.adapt(minimum_jobs=settings.jobs, maximum_jobs=settings.jobs)
@@ -261,6 +274,11 @@ class SlurmConnection:
         # after an error of SLURM the end of the process would try again, and print it
         self._cluster.shutdown_on_close = False
         self._keys.cleanup()
+
+
+def _announce_dashboard(cluster: Any, announce: Callable[[str], None]) -> None:
+    if find_spec("bokeh") is not None:
+        announce(f"dashboard of the cluster: {cluster.dashboard_link}")
 
 
 def _own_security(distributed: Any) -> Any:
@@ -304,26 +322,6 @@ def _in_files(distributed: Any, security: Any, folder: Path) -> Any:
 def _leave(client: Any) -> None:
     with suppress(Exception):
         client.close(timeout=_LEAVE_S)
-
-
-def _check_alive(client: Any, address: str, alone_since: float | None, longest_s: float) -> float | None:
-    """Return since when a cluster has no workers; None if it has some."""
-    if client.status not in ("running", "connecting"):
-        raise FlarewrightError(
-            f"the connection with the cluster at {address} is lost; finished work is kept: repeat the command"
-        )
-    # a connection that breaks meanwhile is found by its state later
-    with suppress(Exception):
-        if client.status == "running" and client.nthreads():
-            return None
-    now = time.monotonic()
-    since = now if alone_since is None else alone_since
-    if now - since > longest_s:
-        raise FlarewrightError(
-            f"the cluster at {address} has had no workers for {longest_s:.0f} s; finished work is kept: start "
-            "workers, and repeat the command"
-        )
-    return since
 
 
 def _reason(error: BaseException) -> str:

@@ -35,9 +35,6 @@ class LocalWorkers:
         self._processes: list[subprocess.Popen[bytes]] = []
         self._names, self._lost_in_a_row = 0, 0
 
-    def __len__(self) -> int:
-        return len(self._processes)
-
     def grow(self, number: int, threads: int | None) -> None:
         """Start processes until there are as many as wanted, with a number of threads for the libraries in each."""
         self._threads = threads

@@ -9,6 +9,9 @@ from pydantic import Field
 from ..base import Frozen
 from .light import Light
 
+Transfer = Literal["srgb", "linear", "rec709", "gamma22", "gamma28", "pq", "hlg"]
+"""What the codes of a file mean: display codes of sRGB, linear values, the codes of a video camera, ..."""
+
 
 class PlateSearch(Frozen):
     """Which areas of a plate are lights, and how bright they are; the options of `flarewright sources`.
@@ -72,7 +75,7 @@ class Backplate(Frozen):
 
     image: str = Field(min_length=1, max_length=4096)
     layer: str | None = None
-    transfer: Literal["srgb", "linear", "rec709", "gamma22", "gamma28", "pq", "hlg"] | None = None
+    transfer: Transfer | None = None
     lights_above: float | None = Field(None, gt=0.0, le=1e30)
     search: PlateSearch = PlateSearch()
 

@@ -227,6 +227,11 @@ class Project(Frozen):
     timeline: Timeline = Timeline()
     plate: Backplate | None = None
 
+    @property
+    def lit_by_plate(self) -> bool:
+        """Whether the lights are those of the plate: layers have its unit then, and add to it as they are."""
+        return self.plate is not None and self.plate.lit
+
     @field_validator("coating", mode="before")
     @classmethod
     def _coating_is_no_text(cls, coating: Any) -> Any:

@@ -458,8 +458,8 @@ def spike_profile(
     repeated = zip(sums, _repeated_tail(v, period * step), strict=True)
     cumulative, density = (table - tail * others[:, None] for table, others in repeated)
     return SpikeProfile(
-        np.ascontiguousarray((1.0 - fade) * cumulative + fade * (half_total - tail / far)),
-        np.ascontiguousarray((1.0 - fade) * density + fade * tail / far**2),
+        (1.0 - fade) * cumulative + fade * (half_total - tail / far),
+        (1.0 - fade) * density + fade * tail / far**2,
         half_total,
         tail,
         step,

@@ -122,7 +122,7 @@ def _named(select: str) -> str:
 def _with_look_light(light: Light, look: Look) -> Light:
     """Give a light the look's spectrum, and the look's size if it has none."""
     values = look.of("lights")
-    if light.diameter_deg > 0.0 or light.shape is not None:
+    if light.extended:
         values = {key: value for key, value in values.items() if key == "spectrum"}
     changed: Light = light.replace(**values)
     return changed

@@ -233,11 +233,7 @@ def _frames(pattern: FramePattern, frames: str | Sequence[int] | None) -> tuple[
         raise ProjectError(
             f"{path} is one picture, a film has many; write {path.stem}.####{path.suffix} (or %04d, $F4)"
         )
-    there = pattern.on_disk()
-    if not there:
-        raise ProjectError(
-            f"no file is named {pattern.text}; check the folder, and the number of digits (#### or %04d)"
-        )
+    there = pattern.found()
     if frames is None:
         gaps = np.diff(there)
         if len(there) > 2 and gaps.max() > gaps.min():

@@ -162,8 +162,7 @@ def with_found_lights(project: Project, found: FoundLights) -> tuple[Project, tu
         raise ProjectError("; ".join(validation_sentences(error))) from None
     if not any(light.intensity > 0.0 for light in lights):
         raise ProjectError("the lens images none of the found lights; choose a longer lens, or a smaller sensor")
-    lit = project.plate is not None and project.plate.lit
-    own = tuple(light for light in project.lights if lit and not found_in_plate(light))
+    own = tuple(light for light in project.lights if project.lit_by_plate and not found_in_plate(light))
     remarks = [f"{count(len(lights), 'light was', 'lights were')} found", *found.shot.remarks]
     if found.shot.clipped and not found.plate.search.brightened:
         remarks.append("the plate clips them, so they are brighter than it shows: --plate-gain or --highlights says so")
@@ -195,7 +194,7 @@ def without_found_lights(project: Project) -> Project:
 
     Dark if it has no others.
     """
-    if project.plate is None or not project.plate.lit:
+    if not project.lit_by_plate:
         return project
     own = tuple(light for light in project.lights if not found_in_plate(light))
     changed: Project = project.replace(lights=own or (Light(field_deg=(0.0, 0.0), intensity=0.0),))
@@ -271,7 +270,7 @@ def kept_on_plate(before: Project, after: Project) -> Project:
     A light of irradiance E at a place with the solid angle omega of a part of the picture gets E' = E (omega' f') /
     (omega f), with the factors f of `plates.lights.plate_factor`.
     """
-    lit = all(project.plate is not None and project.plate.lit for project in (before, after))
+    lit = before.lit_by_plate and after.lit_by_plate
     if not lit or len(before.lights) != len(after.lights) or same_optics(before, after):
         return after
     check_plate(after, before.camera.size_px)

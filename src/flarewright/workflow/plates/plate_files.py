@@ -30,7 +30,7 @@ def is_still(settings: PlateSettings) -> bool:
     return not is_film(settings.files) and not any(FramePattern(name).numbered for name in names)
 
 
-def plate_frames(settings: PlateSettings, frames: Sequence[int] | None, start: int) -> tuple[int, ...]:
+def plate_frames(settings: PlateSettings, frames: Sequence[int] | None) -> tuple[int, ...]:
     """Return the frames of a plate.
 
     Parameters
@@ -38,8 +38,6 @@ def plate_frames(settings: PlateSettings, frames: Sequence[int] | None, start: i
     settings : PlateSettings
     frames : sequence of int, optional
         Wanted ones; None: all that there are.
-    start : int
-        Number of the frame of a single picture.
 
     Returns
     -------
@@ -57,15 +55,11 @@ def plate_frames(settings: PlateSettings, frames: Sequence[int] | None, start: i
         _check_one_film(pattern)
         wanted = _film_frames(settings, frames)
     elif pattern.numbered:
-        found = pattern.on_disk()
-        if not found:
-            raise ProjectError(
-                f"no file is named {settings.files}; check the folder, and the number of digits (#### or %04d)"
-            )
+        found = pattern.found()
         wanted = tuple(range(found[0], found[-1] + 1)) if frames is None else tuple(frames)
         _check_all_there(pattern, wanted, "the plate")
     else:
-        wanted = (start,) if frames is None else tuple(frames)
+        wanted = (settings.first,) if frames is None else tuple(frames)
         _check_all_there(pattern, wanted, "the plate")
     if settings.matte is not None:
         _check_all_there(FramePattern(settings.matte), wanted, "the matte")
@@ -108,7 +102,7 @@ def _check_all_there(pattern: FramePattern, frames: Sequence[int], what: str) ->
         )
 
 
-def first_picture(settings: PlateSettings, frames: Sequence[int] | None, start: int) -> PlatePicture:
+def first_picture(settings: PlateSettings, frames: Sequence[int] | None) -> PlatePicture:
     """Read the first picture of a plate, which states its size and rate; parameters and errors as of `plate_frames`.
 
     That of a film does not depend on the number that its first frame gets.
@@ -116,7 +110,7 @@ def first_picture(settings: PlateSettings, frames: Sequence[int] | None, start: 
     if is_film(settings.files):
         _check_one_film(FramePattern(settings.files))
         return plate_picture(settings, settings.first)
-    return plate_picture(settings, plate_frames(settings, frames, start)[0])
+    return plate_picture(settings, plate_frames(settings, frames)[0])
 
 
 def plate_picture(settings: PlateSettings, frame: int) -> PlatePicture:
