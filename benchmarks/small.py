@@ -7,12 +7,17 @@ The second command measures the ratios and keeps them. The works run in turns wi
 processor time of each counts, so that other load on the machine matters little. Processors differ in what they do well:
 the ratios of one machine are those of another times a common factor, the median over all works. A work has lost speed
 if it exceeds that factor by much; all of them have if the factor itself is large.
+
+A process may be unlucky for its whole life, with the places of its memory for instance. So a loss is measured again, in
+new processes, and counts if every one of them shows it.
 """
 
 from __future__ import annotations
 
 import json
 import statistics
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -41,8 +46,11 @@ RATIOS = Path(__file__).with_name("ratios.json")
 LEAST_TURNS = 5
 """Least number of runs of each work."""
 
-QUICK_S = 0.02
+QUICK_S = 0.1
 """Works below this many seconds are run once more before each measurement."""
+
+PROCESSES = 4
+"""Number of processes that must all show a loss."""
 
 MACHINES_DIFFER = 3.0
 """Common factor of all works up to which machines may differ."""
@@ -133,7 +141,7 @@ def small(row: Row, repeat: int) -> list[dict[str, Any]]:
     ]
 
 
-def lost(now: Mapping[str, float], kept: Mapping[str, float], worst: float) -> list[str]:
+def lost(now: Mapping[str, float], kept: Mapping[str, float], worst: float) -> dict[str, str]:
     """Tell which works lost speed.
 
     Parameters
@@ -145,24 +153,64 @@ def lost(now: Mapping[str, float], kept: Mapping[str, float], worst: float) -> l
 
     Returns
     -------
-    list of str
-        A sentence for each work that lost more, for works without a kept ratio, and for a loss of all works.
+    dict of str to str
+        A sentence for each work that lost more, for works without a kept ratio, and, under an empty name, for a loss of
+        all works.
     """
     changes = {name: ratio / kept[name] for name, ratio in now.items() if name in kept}
-    found = [f"{name}: no ratio is kept; run python -m benchmarks.small" for name in now if name not in kept]
+    found = {name: f"{name}: no ratio is kept; run python -m benchmarks.small" for name in now if name not in kept}
     if not changes:
-        return [*found, "no small work was measured"]
+        return {**found, "": "no small work was measured"}
     common = statistics.median(changes.values())
     if common > MACHINES_DIFFER:
-        found.append(f"all works: {common:.2f} times the kept ratios; machines differ by {MACHINES_DIFFER:g} at most")
+        found[""] = f"all works: {common:.2f} times the kept ratios; machines differ by {MACHINES_DIFFER:g} at most"
     for name, change in changes.items():
         if change > worst * common:
-            found.append(f"{name}: {change / common:.2f} times its kept ratio, beside the other works")
+            found[name] = f"{name}: {change / common:.2f} times its kept ratio, beside the other works"
+    return found
+
+
+def surely_lost(
+    now: Mapping[str, float], kept: Mapping[str, float], worst: float, again: Callable[[], Mapping[str, float]]
+) -> list[str]:
+    """Tell which works lost speed in each of `PROCESSES` processes.
+
+    Parameters
+    ----------
+    now, kept, worst
+        As for `lost`.
+    again : callable
+        Measures the ratios in a new process; called only while there are losses.
+
+    Returns
+    -------
+    list of str
+        The first process' sentences.
+    """
+    found = lost(now, kept, worst)
+    for _ in range(PROCESSES - 1):
+        if not found:
+            break
+        print("\n".join(found.values()), "measured again in a new process", sep="\n", flush=True)
+        once_more = lost(again(), kept, worst)
+        found = {name: sentence for name, sentence in found.items() if name in once_more}
+    return list(found.values())
+
+
+def elsewhere() -> dict[str, float]:
+    """Return the ratios as a new process measures them."""
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.small", "--print"], check=True, stdout=subprocess.PIPE, text=True
+    )
+    found: dict[str, float] = json.loads(done.stdout)
     return found
 
 
 def main() -> None:
-    """Measure the ratios and keep them."""
+    """Measure the ratios and keep them, or print them for `elsewhere`."""
+    if sys.argv[1:] == ["--print"]:
+        print(json.dumps({name: ratio for name, (_, ratio) in ratios(LEAST_TURNS).items()}))
+        return
     found = {name: float(f"{ratio:.3g}") for name, (_, ratio) in ratios(15).items()}
     RATIOS.write_text(json.dumps({"ratios": found}, indent=2) + "\n", encoding="utf-8")
     print(f"wrote {RATIOS}")
