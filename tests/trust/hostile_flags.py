@@ -118,7 +118,7 @@ def prepare(folder: Path) -> None:
     library = ("library", "add", "lens.toml", "--name", "mine")
     for words in (merge, library, ("design", "solve", "shot.toml", "-o", "searched", "--time", "0.2")):
         held, answer = judged(words, folder, keep=True)
-        assert (held, answer) == (True, "done")
+        assert (held, answer) == (True, "done"), f"{' '.join(words)}: {answer}"
 
 
 @cache
