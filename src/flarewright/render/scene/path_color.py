@@ -10,15 +10,17 @@ from numpy.typing import NDArray
 
 from ...kernels.tracing.representative_rays import choose_representatives, seen_rays
 from ...model import Lens
-from ...optics.colour.spectrum import mean_wavelength
+from ...optics.colour.spectrum import hats
 from ...optics.lens.paths import LightPath, direct_path
 from ...optics.rays.bundle import Bundle
 from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum, path_spectra, step_squares
 from ...typing import Floats, Mask
 from .shot import Shot
 
-# number of rays of a bundle that represent its angles of incidence
+# number of rays of a bundle that represent its angles of incidence, at all wavelengths together
 RAYS = 64
+# part of the light below which a wavelength has no rays
+LEAST_SHARE = 0.02
 # number of triangles of the grid among which they are chosen
 TRIANGLES = 4096
 
@@ -55,27 +57,37 @@ def traced_spectrum(shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floa
     """
     if shot.curves is None:
         return None
-    rays, wave = _representative_rays(shot, bundle, to_pixels)
-    squares = step_squares(shot.packed, path, shot.incidence.tilt, bundle.pupil[rays], wave)
-    if len(squares) == 0:
-        return None
-    return path_spectra(shot.curves, [path], squares).of(0)
+    found_nm, spectra = [], []
+    for wave, rays in _representative_rays(shot, bundle, to_pixels):
+        squares = step_squares(shot.packed, path, shot.incidence.tilt, bundle.pupil[rays], wave)
+        if len(squares) > 0:
+            found_nm.append(shot.packed.wavelengths_nm[wave])
+            spectra.append(path_spectra(shot.curves, [path], squares).of(0))
+    if len(spectra) < 2:
+        return spectra[0] if spectra else None
+    # other rays of a ghost land in the picture at other wavelengths, at other angles
+    passed, carried = (
+        np.einsum("wl,wl->l", hats(nm, found_nm), np.stack(curves))
+        for nm, curves in (
+            (CURVE_NM, [one.passed for one in spectra]),
+            (shot.packed.wavelengths_nm, [one.carried for one in spectra]),
+        )
+    )
+    return PathSpectrum(passed, carried)
 
 
-def _representative_rays(shot: Shot, bundle: Bundle, to_pixels: Floats) -> tuple[NDArray[np.intp], int]:
+def _representative_rays(shot: Shot, bundle: Bundle, to_pixels: Floats) -> list[tuple[int, NDArray[np.intp]]]:
     """Choose rays that represent a ghost's light: visible ones, else passing ones, else any that reach the iris.
 
     Returns
     -------
-    rays : ndarray of int
-        Nodes of the bundle.
-    wave : int
-        Index of the traced wavelength at which they pass.
+    list of (int, ndarray of int)
+        Rising indices of traced wavelengths, and nodes of the bundle whose rays pass at each: more where more light is.
     """
-    held_nm = shot.packed.wavelengths_nm[sorted(bundle.traced)]
-    # where most light is: other rays of a ghost land in the picture at other wavelengths, at other angles
-    order = np.argsort(np.abs(held_nm - mean_wavelength(shot.light.spectrum)), kind="stable")
-    waves = [sorted(bundle.traced)[k] for k in order]
+    waves = sorted(bundle.traced)
+    light = np.abs(shot.weights(shot.packed.wavelengths_nm[waves])).sum(axis=1)
+    shares = light / max(light.sum(), np.finfo(np.float64).tiny)
+    counts = np.where(shares < LEAST_SHARE, 0, np.ceil(RAYS * shares)).astype(np.int64)
     anywhere = np.zeros((2, 3)), (np.inf, np.inf)
     looks = (
         visible_rays(shot, to_pixels, bundle.halves),
@@ -83,12 +95,15 @@ def _representative_rays(shot: Shot, bundle: Bundle, to_pixels: Floats) -> tuple
         _visible(shot, *anywhere, bundle.halves, blades=np.empty((0, 4))),
     )
     for seen in looks:
-        # a sliver can pass at one end of the spectrum only
-        for w in waves:
-            chosen, _ = spread_rays(bundle, (w,), seen, RAYS)
-            if chosen.size > 0:
-                return chosen, w
-    return np.empty(0, dtype=np.intp), waves[0]
+        chosen = [(w, spread_rays(bundle, (w,), seen, n)[0]) for w, n in zip(waves, counts, strict=True) if n > 0]
+        if found := [(w, rays) for w, rays in chosen if rays.size > 0]:
+            return found
+        # a sliver can pass at one end of the spectrum only, where the light is faint
+        for w in (w for w, n in zip(waves, counts, strict=True) if n == 0):
+            rays, _ = spread_rays(bundle, (w,), seen, RAYS)
+            if rays.size > 0:
+                return [(w, rays)]
+    return []
 
 
 def spread_rays(
