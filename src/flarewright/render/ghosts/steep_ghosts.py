@@ -17,15 +17,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kernels.raster.bundle import draw_bundle, node_densities
 from ...kernels.tracing.representative_rays import passing_area
-from ...kernels.tracing.sequential import ALIVE
+from ...kernels.tracing.sequential import ALIVE, WEIGHT
 from ...model.project.camera import Colorspace
 from ...model.project.light import Spectrum
 from ...optics.colour.spectrum import band_parts
 from ...optics.rays.bundle import Bundle, trace_bundle
 from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum
 from ...optics.rays.steepness import bright_wavelengths, gap_errors, interpolation_error, throughput_ratios
+from ...optics.rays.torn_cells import cut_failed_triangles
 from ...typing import Floats, Mask
+from ..image.canvas import blank
 from ..scene.path_color import RayFilter, visible_rays
 from ..scene.shot import Shot
 
@@ -43,6 +46,11 @@ LEAST_CHANGE = 0.1
 SLIVER_PART = 0.2
 # a ghost's light ends abruptly where it is dark at one wavelength and above this part of the largest at the next
 ABRUPT_PART = 0.1
+# light begins between two wavelengths if one has less than this part of the other's throughput, and matters if the gap
+# has this share of the ghost's colour
+BEGIN_PART, BEGIN_SHARE = 0.05, 0.05
+# size of the pictures by which a ghost's flux is measured
+SMALL_PX = (64, 36)
 # drafts do not correct ghosts fainter than this, relative to the largest channel of the brightest
 FAINT_PART = 7e-4
 # steps of the search for an end between two wavelengths of a curve, to 0.08 nm
@@ -101,10 +109,24 @@ def steepness(
     throughput[others] = _areas_between(shot, bundle, known_nm[others], to_pixels)
     passed = np.ones(len(CURVE_NM)) if spectrum is None else spectrum.passed
     error, total = interpolation_error(passed, seen_light(shot), known_nm, throughput, drawn)
-    if not error > COLOR_ERROR * total:
+    if not error > COLOR_ERROR * total and not _begins_in_a_gap(shot, passed, known_nm, throughput):
         return "not"
     throughput = throughput[drawn]
     return "much" if throughput.min() < SLIVER_PART * throughput.max() else "little"
+
+
+def _begins_in_a_gap(shot: Shot, passed: Floats, known_nm: Floats, throughput: Floats) -> bool:
+    """Return whether much light is between two wavelengths of which one hardly shows the ghost.
+
+    Throughput begins there like a square root or later: the line is wrong by up to a third of the gap, the spline by
+    less.
+    """
+    low, high = np.minimum(throughput[1:], throughput[:-1]), np.maximum(throughput[1:], throughput[:-1])
+    begins = (low < BEGIN_PART * high) & (high > ABRUPT_PART * throughput.max())
+    if not begins.any():
+        return False
+    _, shares = gap_errors(passed, seen_light(shot), known_nm, throughput[None])
+    return bool((shares[0][begins] > BEGIN_SHARE).any())
 
 
 def bent_spectrum(
@@ -130,7 +152,7 @@ def bent_spectrum(
     """
     # use one grid for both, so that its errors cancel
     known, found = (
-        _areas(one, replace(bundle, traced=held), list(range(len(one.packed.wavelengths_nm))), to_pixels)
+        _fluxes(one, replace(bundle, traced=held), list(range(len(one.packed.wavelengths_nm))), to_pixels)
         for one, held in ((shot, {}), (fine, bundle.traced))
     )
     assert shot.between is not None
@@ -145,10 +167,26 @@ def bent_spectrum(
     return PathSpectrum(spectrum.passed * ratios[0], spectrum.carried)
 
 
-def _areas(shot: Shot, bundle: Bundle, waves: list[int], to_pixels: Floats) -> Floats:
-    """Return the visible area of the pupil at some wavelengths, mm^2, shape (len(waves),)."""
-    seen, tilt = visible_rays(shot, to_pixels, bundle.halves), shot.incidence.tilt
-    return np.array([_area_of(bundle, trace_bundle(shot.packed, w, bundle, tilt), seen) for w in waves])
+def _fluxes(shot: Shot, bundle: Bundle, waves: list[int], to_pixels: Floats) -> Floats:
+    """Return the light in the picture at some wavelengths if all rays carry 1, mm^2, shape (len(waves),).
+
+    The bundle is drawn, small: a sum of nodes that pass would jump by 8 % from wavelength to wavelength where a ghost
+    covers few cells.
+    """
+    place = to_pixels * np.tile(np.array(SMALL_PX) / shot.size_px, 2)
+    found = np.empty(len(waves))
+    for k, w in enumerate(waves):
+        data = trace_bundle(shot.packed, w, bundle, shot.incidence.tilt).copy()
+        data[:, WEIGHT] = 1.0
+        whole, data = cut_failed_triangles(bundle, data)
+        canvas = blank(SMALL_PX)
+        draw_bundle(
+            data, whole.pupil, whole.triangles, node_densities(data, whole.pupil, whole.triangles),
+            bundle.path.stop_crossings, shot.opening.blades, shot.opening.levels, shot.incidence.axes, place, 1.0,
+            np.ones(3), canvas.plane(), whole.halves,
+        )  # fmt: skip
+        found[k] = canvas.plane()[..., 0, :].sum(dtype=np.float64)
+    return found
 
 
 def _area_of(bundle: Bundle, rays: Floats, seen: Sequence[RayFilter]) -> float:
@@ -157,7 +195,7 @@ def _area_of(bundle: Bundle, rays: Floats, seen: Sequence[RayFilter]) -> float:
 
 
 def _areas_between(shot: Shot, bundle: Bundle, wavelengths_nm: Floats, to_pixels: Floats) -> Floats:
-    """As `_areas`, at any wavelengths: rays are interpolated between those of the grid, or extrapolated.
+    """Return the visible area of the pupil, mm^2; rays are interpolated between those of the grid, or extrapolated.
 
     Indices of glass are nearly linear in 1 / wavelength^2 (Cauchy), and so are rays: through three wavelengths they are
     polynomials in it.
