@@ -3,6 +3,7 @@
 `toml_lens.read_lens` reads a lens file of any format; `lens_writer.write_lens` writes our own TOML format.
 
 - `coating_text`: `parse_coating`, `parse_coating_choice`, `format_coating`, `read_coating_file`
+- `configuration_table`: `settings`, what differs between the configurations of a file
 - `foreign_file`: `decoded`, `number_of`, `lens_errors`, what readers of other programs' files share
 - `formats`: lens files of CODE V, OSLO, RealFlare, Optiland and pbrt, `.lens` and CSV tables
 - `glass_catalogue`: `by_name`, `nearest`, glasses with their dispersion formulas

@@ -10,6 +10,7 @@ from flarewright.cli.app import run
 from flarewright.errors import LensError
 from flarewright.model import Stop
 from flarewright.optics.lens.paraxial import first_order
+from flarewright.optics.lens.zoom import positioned
 from flarewright.render.scene.resolve import open_lens
 
 DOUBLET = """\
@@ -170,3 +171,96 @@ def test_the_flag_of_the_command_line(tmp_path, monkeypatch, capsys):
     assert run(["lens", "check", "b.toml", "--first-column", "radii"]) == 2
     assert "is no .seq file" in capsys.readouterr().err
     assert run(["lens", "check", "a.seq", "--first-column", "x"]) == 2
+
+
+ZOOM = """\
+RDM;LEN "VERSION: 2026"
+TITLE 'Two lenses'
+FNO 5.6
+DIM M
+WL 656.3 587.6 486.1
+REF 2
+YAN 0.0 8.0
+SO 0.0 0.1e14
+S 80 4 600.400
+CIR 15
+S -80 20
+CIR 15
+S 0 1
+STO
+CIR 6
+S 60 4 600.400
+CIR 15
+S -60 30
+CIR 15
+PIM
+SI 0 0
+ZOO 3
+ZOO TIT
+TIT Z1 "wide"
+TIT Z2 "normal"
+ZOO FNO 5.6 6.0 4.5
+ZOO YAN F2 8.0 7.0 &
+ 10.0
+ZOO THI S2 20 26.5 12
+ZOO THC S2 100 100 100
+ZOO VUY F2 0.1 0.2 0.3
+GO
+"""
+
+
+def test_zoom_positions(tmp_path):
+    lens = opened(tmp_path, ZOOM).lens
+    assert [position.gaps for position in lens.positions] == [((1, 20.0),), ((1, 26.5),), ((1, 12.0),)]
+    for position, gap, f_number in zip(lens.positions, (20.0, 26.5, 12.0), (5.6, 6.0, 4.5), strict=True):
+        glass = [(1 / 80, 4.0, 1.6), (-1 / 80, gap + 1.0, 1.0), (1 / 60, 4.0, 1.6), (-1 / 60, 0.0, 1.0)]
+        at = positioned(lens, position.name, None)
+        efl = paraxial(glass)
+        assert first_order(at).efl == pytest.approx(efl, rel=1e-9)
+        assert first_order(at).entrance_pupil_diameter == pytest.approx(efl / f_number, rel=1e-9)
+    assert [position.field_deg for position in lens.positions] == [None, 7.0, 10.0]
+    # one value a command is the same
+    single = ZOOM.replace("ZOO THI S2 20 26.5 12", "ZOO THI S2\nTHI S2 Z1 20;THI S2 Z2 26.5;THI S2 Z3 12")
+    assert opened(tmp_path, single).lens == lens
+
+
+def test_a_near_object_of_a_zoom_position_is_a_focus_distance(tmp_path):
+    head, tail = ZOOM[: ZOOM.index("ZOO 3")].replace("FNO 5.6", "EPD 6"), "GO\n"
+    table = "ZOO 2; ZOO THI SO 1e13 500; ZOO THI S2 20 22; ZOO EPD 6 5\n"
+    lens = opened(tmp_path, head + table + tail).lens
+    assert [(each.name, each.focus_distance) for each in lens.positions] == [("infinity", None), ("at 500 mm", 500.0)]
+    near = positioned(lens, None, 500.0)
+    assert near.rows[1].thickness == 22.0
+    pupils = [first_order(positioned(lens, each.name, None)).entrance_pupil_diameter for each in lens.positions]
+    assert pupils == pytest.approx([6.0, 5.0], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "remark"),
+    [
+        ("ZOO TIT", "ZOO RDY S1 80 80 90", "configuration 3 differs in RDY 1, which no position of a lens can hold"),
+        ("ZOO TIT", "ZOO GLA S1 600.400 600.400 NBK7", "configuration 3 differs in GLA 1, which no position"),
+        ("ZOO TIT", "ZOO YDE S4 0 0 1", "configuration 3 differs in YDE 4, which no position"),
+        ("ZOO TIT", "ZOO CIR S1 15 15 9", "surface 1: the rim differs between the file's configurations"),
+        ("ZOO TIT", "ZOO THI S9 1 2 3", "are left out: 'ZOO THI S9' names no surface or field of the file"),
+        ("ZOO TIT", "ZOO THI S'G1' 1 2 3", "names no surface or field of the file"),
+        ("ZOO TIT", "ZOO THI S3 1 2", "configuration 3 is left out: ZOO THI 3 has no value for it"),
+        ("ZOO 3", "ZOO 2", "left out: ZOO 2 states fewer positions than a row has values"),
+        ("ZOO 3", "ZOO 3000", "left out: ZOO 3000 is no number of positions"),
+        ("26.5 12", "26.5 x", "configuration 3: THI 2 is 'x', no number; it is left out"),
+        ("PIM", "PIM\nPIK THI S3 THI S2", "PIK sets the gap behind surface 3: write its values as ZOO THI S3"),
+        ("SI 0 0", "SI 0 0\nTHI S3 OAL S2..4 25", "OAL sets the gap behind surface 3: write its values"),
+        ("ZOO TIT", "THI S2 Z2", "'THI S2 Z2' is not understood"),
+    ],
+)
+def test_what_no_zoom_position_holds_is_told(tmp_path, old, new, remark):
+    assert old in ZOOM
+    remarks = opened(tmp_path, ZOOM.replace(old, new)).remarks
+    assert any(remark in said for said in remarks), remarks
+
+
+def test_one_zoom_position_is_no_position(tmp_path):
+    text = ZOOM[: ZOOM.index("ZOO 3")] + "ZOO 1\nGO\n"
+    found = opened(tmp_path, text)
+    assert found.lens.positions == ()
+    assert not any("ZOO" in said or "position" in said for said in found.remarks)

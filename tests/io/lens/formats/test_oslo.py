@@ -7,6 +7,7 @@ import pytest
 from flarewright.errors import LensError
 from flarewright.model import Stop
 from flarewright.optics.lens.paraxial import first_order
+from flarewright.optics.lens.zoom import positioned
 from flarewright.render.scene.resolve import open_lens
 
 DOUBLET = """\
@@ -92,7 +93,7 @@ def test_radii_glasses_opening_and_field(tmp_path):
     assert order.entrance_pupil_diameter == pytest.approx(25.0)
     assert "the last gap is solved in the file; the sensor is placed at the paraxial focus" in found.remarks
     assert not any("paraxial focus (" in remark for remark in found.remarks)
-    assert "the configurations (CFG) are left out; the lens is that of the surfaces" in found.remarks
+    assert "configuration 2 is left out: the glass behind row 1 has another thickness" in found.remarks
 
 
 def test_the_listing_of_the_users_guide_has_its_focal_length(tmp_path):
@@ -188,3 +189,71 @@ def test_what_is_not_supported_is_refused(tmp_path, old, new, sentence):
 def test_unknown_commands_are_named(tmp_path):
     found = opened(tmp_path, changed("RD   61.47", "RD 61.47; XYZ 3"))
     assert "surface 1: command 'XYZ' is left out" in found.remarks
+
+
+ZOOM = """\
+LEN NEW "Two lenses" 50 7
+EBR 4.0
+ANG 8.0
+TH 1e20
+NXT; GLA 1.6; RD 80; TH 4; AP 15
+NXT; AIR; RD -80; TH 20; AP 15
+NXT; AST; TH 1; AP 6
+NXT; GLA 1.6; RD 60; TH 4; AP 15
+NXT; AIR; RD -60; TH 30; AP 15
+NXT; TH 0.5
+NXT
+END 7
+CFG NEW
+TH 2 2 26.5
+TH 2 3 12
+EBR 2 3.0
+ANG 3 10
+CFWT 2 0.5
+WW1 2 0.3
+END
+"""
+
+
+def test_configurations_are_positions(tmp_path):
+    found = opened(tmp_path, ZOOM)
+    lens = found.lens
+    assert [position.gaps for position in lens.positions] == [((1, 20.0),), ((1, 26.5),), ((1, 12.0),)]
+    for position, gap in zip(lens.positions, (20.0, 26.5, 12.0), strict=True):
+        glass = [(1 / 80, 4.0, 1.6), (-1 / 80, gap + 1.0, 1.0), (1 / 60, 4.0, 1.6), (-1 / 60, 0.0, 1.0)]
+        order = first_order(positioned(lens, position.name, None))
+        assert order.efl == pytest.approx(paraxial(glass), rel=1e-9)
+        # EBR is half the entrance pupil
+        pupil = 6.0 if gap == 26.5 else 8.0
+        assert order.entrance_pupil_diameter == pytest.approx(pupil, rel=1e-9)
+    assert [position.field_deg for position in lens.positions] == [None, None, 10.0]
+
+
+def test_a_gap_that_is_picked_up_moves_with_its_source(tmp_path):
+    text = ZOOM.replace("NXT; AST; TH 1;", "NXT; AST; PK TH 2;")
+    lens = opened(tmp_path, text).lens
+    assert [position.gaps for position in lens.positions] == [
+        ((1, 20.0), (2, 20.0)), ((1, 26.5), (2, 26.5)), ((1, 12.0), (2, 12.0))
+    ]  # fmt: skip
+    both = opened(tmp_path, text.replace("CFWT 2 0.5", "TH 3 2 5"))
+    assert both.lens.positions == ()
+    assert any("TH changes surface 3, whose gap is a pickup" in said for said in both.remarks)
+
+
+@pytest.mark.parametrize(
+    ("row", "remark"),
+    [
+        ("CV 1 3 0.02", "configuration 3 differs in CV 1, which no position of a lens can hold"),
+        ("GLA 1 3 BK7", "configuration 3 differs in GLA 1, which no position"),
+        ("DCY 4 3 1.0", "configuration 3 differs in DCY 4, which no position"),
+        ("AP 1 3 9", "surface 1: the rim differs between the file's configurations"),
+        ("TH 2 3", "the configurations (CFG) are left out: 'TH 2 3' is not understood"),
+        ("TH 12 3 4", "the configurations (CFG) are left out: 'TH 12 3 4' is not understood"),
+        ("TH 2.5 3 4", "the configurations (CFG) are left out: 'TH 2.5 3 4' is not understood"),
+        ("TH 2 3 dense", "configuration 3: TH 2 is 'dense', no number; it is left out"),
+        ("TH 3 500 4", "the configurations (CFG) are left out: 'TH 3 500 4' is not understood"),
+    ],
+)
+def test_what_no_position_holds_is_told(tmp_path, row, remark):
+    remarks = opened(tmp_path, ZOOM.replace("CFWT 2 0.5", row)).remarks
+    assert any(remark in said for said in remarks), remarks

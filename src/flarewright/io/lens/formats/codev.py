@@ -2,9 +2,9 @@
 
 Commands are separated by line ends or semicolons; `&` continues a line, `!` begins a comment. The reader uses TITLE,
 DIM, RDM, the aperture (EPD, FNO), the fields (XAN, YAN, XIM, YIM, XRI, YRI), REF and WL, PRV tables of indices, and of
-each surface (SO, S, SI) curvature or radius, thickness and glass, STO, CIR, CON, ASP with K and A to J. Other commands
-that change a surface are errors; remarks name the others. A file without RDM does not state whether its first column
-holds radii or curvatures, so the caller has to.
+each surface (SO, S, SI) curvature or radius, thickness and glass, STO, CIR, CON, ASP with K and A to J; `codev_zoom`
+reads the zoom positions (ZOO). Other commands that change a surface are errors; remarks name the others. A file without
+RDM does not state whether its first column holds radii or curvatures, so the caller has to.
 
 Source: the sequence files that lens vendors publish, and the command names of the CODE V reference.
 """
@@ -19,36 +19,23 @@ from typing import Literal
 from pydantic import ValidationError
 
 from flarewright.model import Medium, Surface
-from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
+from flarewright.model.lens.raw_lens import Configuration, RawSequence, SequenceRow
 
 from ...files.door import shown
 from ...files.sentences import shorten, validation_sentences
 from .. import media
+from ..configuration_table import Stated
 from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_data, number_of, whole
 from ..lens_fields import CURVATURE
 from ..medium_names import named_medium, tabulated_medium
+from .codev_words import FIELDS, IDLE, IN_ITS_LINE, SHIFTS, UNSUPPORTED, VIGNETTING
+from .codev_zoom import Zoom, positions, solved_gap, zoom_cell, zoom_row
 
 FirstColumn = Literal["radii", "curvatures"]
 
 _MM = {"M": 1.0, "MM": 1.0, "C": 10.0, "CM": 10.0, "I": 25.4, "IN": 25.4}
 # A to H are terms of r^4 to r^18, J is that of r^20
 _TERMS = {letter: k for k, letter in enumerate("ABCDEFGHJ")}
-_FIELDS = ("XAN", "YAN", "XIM", "YIM", "XRI", "YRI", "XOB", "YOB")
-_VIGNETTING = ("VUX", "VLX", "VUY", "VLY")
-# codes and targets of optimization, weights, labels, dates, solves that state their result, tolerances
-_IDLE = frozenset({
-    "LEN", "GO", "INI", "WTW", "WTF", "CCY", "CCX", "THC", "KC", "GLC", "SLB", "PIM", "CUM", "THM", "UMY", "UCY",
-    "HMY", "PIK", "TEM", "PRE", "CA", "SPH", "IC", "DEL", "CUF", "RDF", "FRZ", "WAV", "DER", "END", "NOR", "GL1", "GL2",
-    "MTH", "CLS", "CRA", "POL", "TOL", "DLT", "DLN", "DLR", "DLF", "TIR", "COM", "AFI", "AC", "BC", "CC", "DC", "EC",
-    "FC", "GC", "HC", "JC", "PUY", "PUX",
-})  # fmt: skip
-# what tilts, shifts or shapes a surface, or makes it no refracting one
-_UNSUPPORTED = frozenset({
-    "ADE", "BDE", "CDE", "XDE", "YDE", "ZDE", "ALP", "BET", "GAM", "INC", "SPS", "CYL", "XTO", "YTO", "AAS", "GRT",
-    "DIF", "FRE", "HOE", "GRX", "ARR", "UDS", "ZRN", "SPL", "BEN", "DAR", "REV", "RET", "GLB", "NSS", "CUX", "RDX",
-})  # fmt: skip
-_IN_ITS_LINE = frozenset({"RDY", "CUY", "THI", "GLA", "RMD"})
-_SHIFTS = frozenset({"ADE", "BDE", "CDE", "XDE", "YDE", "ZDE", "ALP", "BET", "GAM", "CUX", "RDX"})
 _NOT_ROUND = ("REX", "REY", "ELX", "ELY", "ADX", "ADY", "ARO", "POX", "POY")
 _WORDS = re.compile(r"'[^']*'|\"[^\"]*\"|[^\s;]+")
 
@@ -75,6 +62,7 @@ class _Reading:
     private: dict[str, list[float]] = field(default_factory=dict)
     private_nm: list[float] = field(default_factory=list)
     in_private: bool = False
+    zoom: Zoom = field(default_factory=Zoom)
     problems: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     unknown: dict[str, list[str]] = field(default_factory=dict)
@@ -130,15 +118,22 @@ def _command(words: list[str], reading: _Reading) -> None:
         _private(key, words, reading)
     elif key == "PRV":
         reading.in_private = True
+    elif key == "ZOO":
+        zoom_row(words[1:], len(reading.surfaces), reading.zoom)
+    elif zoom_cell(words, len(reading.surfaces), reading.zoom) or solved_gap(
+        words, len(reading.surfaces), reading.zoom
+    ):
+        # what varies between zoom positions, and gaps whose result the lines S hold
+        return
     elif key in ("SO", "S", "SI") or re.fullmatch(r"S\d+", key):
         reading.surfaces.append(_Surface(len(reading.surfaces), words[1:]))
     elif key == "RDM":
         reading.radii = not (len(words) > 1 and words[1].upper().startswith("N"))
-    elif key in ("TIT", "TITLE", "DIM", "EPD", "FNO", "NA", "NAO", "WL", "REF", "ZOO", *_FIELDS, *_VIGNETTING):
+    elif key in ("TIT", "TITLE", "DIM", "EPD", "FNO", "NA", "NAO", "WL", "REF", *FIELDS, *VIGNETTING):
         reading.head.setdefault("TITLE" if key == "TIT" else key, words[1:])
-    elif key == "STO" or (reading.surfaces and key not in _IDLE):
+    elif key == "STO" or (reading.surfaces and key not in IDLE):
         _of_surface(key, words[1:], reading)
-    elif key not in _IDLE:
+    elif key not in IDLE:
         reading.unknown.setdefault(key, [])
 
 
@@ -179,10 +174,10 @@ def _of_surface(key: str, words: list[str], reading: _Reading) -> None:
             surface.terms[_TERMS[key]] = value
     elif key == "CIR":
         _rim(surface, words, reading)
-    elif key in _IN_ITS_LINE:
+    elif key in IN_ITS_LINE:
         reading.problems.append(f"{where}: {key} changes it; give radius, thickness and glass in its line S instead")
-    elif key in _UNSUPPORTED:
-        if key not in _SHIFTS or any(number_of(word) for word in words):
+    elif key in UNSUPPORTED:
+        if key not in SHIFTS or any(number_of(word) for word in words):
             reading.problems.append(f"{where}: {key} tilts, shifts or shapes it in a way that is not supported")
     else:
         reading.unknown.setdefault(key, []).append(str(surface.number))
@@ -231,13 +226,25 @@ def _sequence(path: Path, reading: _Reading, first_column: FirstColumn | None) -
     if problems:
         return None
     kept = tuple(row for row in rows if row is not None)
-    stated = next((row.surface.semi_diameter for row in kept if row.stop), None)
+    stop = next((row for row in kept if row.stop), None)
+    stated = None if stop is None else stop.surface.semi_diameter
+    opening, field_of_view = _opening(reading, mm), _field(reading, mm)
+    one = Configuration(number=1, stop_semi_diameter=stated, focus_distance=distance, **opening, **field_of_view)
+    several = _positions(one, None if stop is None else stop.number, mm, reading)
     title = (reading.head.get("TITLE") or [""])[0].strip("'\"").strip()
     return RawSequence(
         file=shown(path.name), name=" ".join(title.split()) or shown(path.stem), rows=kept,
-        stop_semi_diameter=stated, focus_distance=distance, **_opening(reading, mm), **_field(reading, mm),
-        remarks=(*reading.remarks, *media.remarks(reading.findings, "surface")),
+        stop_semi_diameter=stated, focus_distance=distance, **opening, **field_of_view,
+        configurations=several, remarks=(*reading.remarks, *media.remarks(reading.findings, "surface")),
     )  # fmt: skip
+
+
+def _positions(one: Configuration, stop: int | None, mm: float, reading: _Reading) -> tuple[Configuration, ...]:
+    axes = _field_axes(reading)
+    x, y = ([number_of(word) or 0.0 for word in reading.head.get(axis, [])] for axis in axes)
+    longest = max(len(x), len(y))
+    points = ([*x, *[0.0] * (longest - len(x))], [*y, *[0.0] * (longest - len(y))])
+    return positions(reading.zoom, Stated(one, stop, mm, points), axes, reading.remarks)
 
 
 def _row(surface: _Surface, mm: float, radii: bool, reading: _Reading) -> SequenceRow | None:
@@ -305,26 +312,30 @@ def _opening(reading: _Reading, mm: float) -> dict[str, float | None]:
     return {}
 
 
+def _field_axes(reading: _Reading) -> tuple[str, str]:
+    """Return the commands of the field points along x and y: of angles or of image heights."""
+    columns = {key: [number_of(word) for word in reading.head.get(key, [])] for key in FIELDS}
+    for axes in (("XAN", "YAN"), ("XIM", "YIM"), ("XRI", "YRI")):
+        largest = largest_field(*(columns[axis] for axis in axes))
+        if largest > 0.0 and (axes[0] != "XAN" or largest < 90.0):
+            return axes
+    return "XAN", "YAN"
+
+
 def _field(reading: _Reading, mm: float) -> dict[str, float | None]:
     """Return the largest field as an angle or an image height."""
-    columns = {key: [number_of(word) for word in reading.head.get(key, [])] for key in _FIELDS}
-    for axes, name in (
-        (("XAN", "YAN"), "field_deg"),
-        (("XIM", "YIM"), "image_height"),
-        (("XRI", "YRI"), "image_height"),
-    ):
-        largest = largest_field(*(columns[axis] for axis in axes))
-        if largest > 0.0 and (name != "field_deg" or largest < 90.0):
-            return {name: largest * (1.0 if name == "field_deg" else mm)}
-    return {}
+    axes = _field_axes(reading)
+    x, y = ([number_of(word) for word in reading.head.get(axis, [])] for axis in axes)
+    largest = largest_field(x, y)
+    if axes[0] == "XAN":
+        return {"field_deg": largest} if 0.0 < largest < 90.0 else {}
+    return {"image_height": largest * mm}
 
 
 def _remark(reading: _Reading) -> None:
     """Append remarks on what the file states and the lens does not hold."""
-    if any(number_of(word) for key in _VIGNETTING for word in reading.head.get(key, [])):
+    if any(number_of(word) for key in VIGNETTING for word in reading.head.get(key, [])):
         reading.remarks.append("vignetting factors (VUX to VLY) are left out; the rims vignette")
-    if "ZOO" in reading.head:
-        reading.remarks.append("the zoom positions (ZOO) are left out; the lens is that of the surfaces")
     for key in ("NA", "NAO"):
         if key in reading.head:
             reading.remarks.append(f"the numerical aperture ({key}) is left out")

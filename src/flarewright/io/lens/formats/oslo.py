@@ -4,7 +4,8 @@ A file holds commands, one a line or several between semicolons; `//` begins a c
 the lens of the surfaces 0 (the object) to n (the image), `NXT` the next surface, `END` ends them. The reader uses UNI
 (millimetres a unit), the aperture (EBR, FNO), the field (ANG, GIH), WV, and of each surface AIR, GLA, RD, CV, TH, AP,
 AST, CC, the terms AD to AG of r^4 to r^10, ASP ASR with AS1 of r^2, AS2 of r^4 and so on, GTO, and pickups (PK) of
-glass, curvature and thickness. Other commands that change a surface are errors; remarks name the rest.
+glass, curvature and thickness; `oslo_configurations` reads what follows CFG. Other commands that change a surface are
+errors; remarks name the rest.
 
 Source: the listing of a lens file in the program's user guide, files that it saved, and its names of commands.
 """
@@ -20,14 +21,16 @@ from pydantic import ValidationError
 
 from flarewright.model import Medium, Surface
 from flarewright.model.lens.prescription import MOST_TERMS
-from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
+from flarewright.model.lens.raw_lens import Configuration, RawSequence, SequenceRow
 
 from ...files.door import shown
 from ...files.sentences import shorten, validation_sentences
 from .. import media
+from ..configuration_table import Stated
 from ..foreign_file import INFINITE, MOST_SURFACES, decoded, lens_data, number_of, whole
 from ..lens_fields import CURVATURE
 from ..medium_names import named_medium, numbered_medium, tabulated_medium
+from .oslo_configurations import Table, cell, configurations
 
 _WORD = re.compile(r'"(?:\\.|[^"\\])*"|[^\s"]+')
 _PART = re.compile(r'"(?:\\.|[^"\\])*"|//.*|;|[^;"/]+|/|"')
@@ -49,6 +52,10 @@ _IDLE = frozenset({
     "LMO", "TCE", "TEM", "PRE", "APCK", "TELE", "DT", "ATD", "CXD", "APD", "GCD", "RCD", "BED", "PFD", "TDD", "CSD",
     "TSD", "WRSP", "AFO", "AIM", "IMS", "DLNR",
 })  # fmt: skip
+# what a file states once and a configuration again
+_COMMON = (
+    "stop_semi_diameter", "focus_distance", "f_number", "entrance_pupil_diameter", "field_deg", "image_height"
+)  # fmt: skip
 _PICKED = {"GLA": "glass", "CV": "curvature", "CVM": "curvature", "TH": "thickness", "THM": "thickness", "AP": "rim"}
 
 
@@ -82,6 +89,9 @@ class _Reading:
     at: int = 0
     wavelengths_um: tuple[float, ...] = _LINES_UM
     ended: bool = False
+    in_table: bool = False
+    table: Table = field(default_factory=Table)
+    picked: dict[int, tuple[int, float]] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     unknown: dict[str, list[str]] = field(default_factory=dict)
@@ -135,8 +145,10 @@ def _commands(text: str) -> Iterator[list[str]]:
 def _command(words: list[str], reading: _Reading) -> None:
     key, values = words[0].upper(), words[1:]
     if reading.ended:
-        if key == "CFG":
-            reading.remarks.append("the configurations (CFG) are left out; the lens is that of the surfaces")
+        if key == "CFG" or (key == "END" and reading.in_table):
+            reading.in_table = key == "CFG"
+        elif reading.in_table:
+            cell(words, max(reading.surfaces), reading.table)
     elif key == "LEN":
         reading.name = " ".join(values[1].strip('"').split()) if len(values) > 1 else ""
         counted = number_of(values[-1]) if values else None
@@ -216,6 +228,7 @@ def _number(key: str, values: list[str], reading: _Reading) -> None:
         surface.solved.discard("curvature")
     elif key in ("TH", "THF"):
         surface.thickness = value
+        reading.picked.pop(surface.number, None)
         surface.solved.discard("thickness")
     elif key in ("AP", "APF"):
         surface.rim = value
@@ -247,6 +260,9 @@ def _pick_up(values: list[str], reading: _Reading) -> None:
         surface.curvature = sign * source.curvature
     elif what == "thickness":
         surface.thickness = sign * source.thickness
+        # a chain of pickups has the first one's gap
+        first, turn = reading.picked.get(source.number, (source.number, 1.0))
+        reading.picked[surface.number] = (first, sign * turn)
     else:
         surface.rim = source.rim
 
@@ -285,11 +301,19 @@ def _sequence(path: Path, reading: _Reading) -> RawSequence | None:
     kept = tuple(row for row in rows if row is not None)
     distance = reading.surfaces[0].thickness * mm
     name = reading.name if reading.name.lower() != "no name" else ""
-    return RawSequence(
-        file=shown(path.name), name=name or shown(path.stem), rows=kept,
-        stop_semi_diameter=next((row.surface.semi_diameter for row in kept if row.stop), None),
+    stop = next((row for row in kept if row.stop), None)
+    one = Configuration(
+        number=1, stop_semi_diameter=None if stop is None else stop.surface.semi_diameter,
         focus_distance=distance if 0.0 < distance < INFINITE else None, **_opening(reading.head, mm),
-        **_field(reading.head, mm), remarks=(*reading.remarks, *media.remarks(reading.findings, "surface")),
+        **_field(reading.head, mm),
+    )  # fmt: skip
+    height = (one.field_deg if one.image_height is None else one.image_height / mm) or 0.0
+    stated = Stated(one, None if stop is None else stop.number, mm, ([0.0], [height]))
+    several = configurations(reading.table, stated, reading.picked, reading.remarks)
+    return RawSequence(
+        file=shown(path.name), name=name or shown(path.stem), rows=kept, configurations=several,
+        **{key: getattr(one, key) for key in _COMMON},
+        remarks=(*reading.remarks, *media.remarks(reading.findings, "surface")),
     )  # fmt: skip
 
 
