@@ -50,6 +50,13 @@ def form(row):
         coefficients, norm_radius = row["zernike"]
         words = {"surface_type": "zernike", "radius": radius, "conic": row["conic"], **exact}
         return {**words, "coefficients": coefficients, "norm_radius": norm_radius, "zernike_type": "noll", **place}
+    if row.get("odd_asphere"):
+        # optiland's first coefficient belongs to r
+        coefficients = [0.0] * (max(len(row["asphere"]) + 1, len(row["odd_asphere"])) * 2 + 2)
+        coefficients[2 : 2 + 2 * len(row["odd_asphere"]) : 2] = row["odd_asphere"]
+        coefficients[3 : 3 + 2 * len(row["asphere"]) : 2] = row["asphere"]
+        words = {"surface_type": "odd_asphere", "radius": radius, "conic": row["conic"], **exact}
+        return {**words, "coefficients": coefficients, **place}
     if row.get("asphere"):
         # optiland's first coefficient belongs to r^2
         coefficients = [0.0, *row["asphere"]]

@@ -121,6 +121,10 @@ SHAPES: dict[str, dict[int, dict[str, Any]]] = {
         0: {"conic": -0.6, "asphere": (3e-6, -2e-8, 4e-11)},
         3: {"asphere": (-2e-5, 1e-7, 0.0, 0.0, 0.0, 0.0, 3e-18)},
     },
+    "odd aspheres": {
+        0: {"conic": -0.6, "asphere": (3e-6,), "odd_asphere": (4e-5, 0.0, -2e-9)},
+        3: {"odd_asphere": (-2e-4, 1e-6)},
+    },
     "cylinders": {0: {"curvature_x": 0.0}, 6: {"curvature": 0.0, "curvature_x": -0.05, "conic_x": -0.4}},
     "decentred": {0: {"decentre": (0.4, -0.3)}, 5: {"decentre": (-0.2, 0.1)}},
     "tilted about x": {2: {"tilt_deg": (1.5, 0.0)}},
@@ -154,6 +158,7 @@ def in_optilands_words(a_lens: Any, row: dict[str, Any], k: int) -> dict[str, An
     (cx, kx), tilt = surface.meridian_x, np.radians(surface.tilt_deg or (0.0, 0.0)).tolist()
     dx, dy = surface.decentre or (0.0, 0.0)
     words = {**row, "curvature": surface.curvature, "conic": surface.conic, "asphere": list(surface.asphere)}
+    words["odd_asphere"] = list(surface.odd_asphere)
     words |= {"dx": dx, "dy": dy, "rx": tilt[0], "ry": tilt[1]}
     if surface.toroidal:
         words |= {"curvature_x": cx, "conic_x": kx}

@@ -153,6 +153,7 @@ MISTAKES = [
     ('radius = "flat"', 'radius = "flat", conic_x = "one"', "row 1: conic_x is 'one', a number"),
     ('radius = "flat"', 'radius = "flat", asphere = 1e-6', "row 1: asphere is 1e-06, a list of numbers"),
     ('radius = "flat"', 'radius = "flat", asphere = []', "row 1: asphere has 0 terms: give 1 to 9"),
+    ('radius = "flat"', 'radius = "flat", odd_asphere = []', "row 1: odd_asphere has 0 terms: give 1 to 9"),
     ('radius = "flat"', 'radius = "flat", asphere = [1e-6, "x"]', "row 1: asphere[1] is 'x', a number"),
     ('radius = "flat"', 'radius = "flat", decentre = [0.1]', "row 1: decentre has 1 numbers: give two"),
     ('radius = "flat"', 'radius = "flat", decentre = [0.1, 500]', "row 1: decentre[1] is 500: it must be at most 100"),
@@ -429,6 +430,7 @@ air_surfaces = st.builds(
     curvature_x=st.none() | curvatures,
     conic_x=st.none() | st.floats(-10.0, 10.0),
     asphere=st.lists(st.floats(-1.0, 1.0), max_size=9).map(tuple),
+    odd_asphere=st.lists(st.floats(-1.0, 1.0), max_size=9).map(tuple),
     decentre=pairs,
     tilt_deg=pairs,
     figure=figures,
@@ -439,7 +441,9 @@ air_surfaces = st.builds(
     semi_diameter_estimated=st.booleans(),
     coating=st.none() | coatings,
 ).map(lambda row: row.replace(semi_diameter=min(row.semi_diameter, row.equator)) if row.semi_diameter else row)
-air_surfaces = air_surfaces.map(lambda row: row.replace(asphere=()) if row.lifted > (row.semi_diameter or 0.0) else row)
+air_surfaces = air_surfaces.map(
+    lambda row: row.replace(asphere=(), odd_asphere=()) if row.lifted > (row.semi_diameter or 0.0) else row
+)
 surfaces = st.builds(lambda surface, medium: surface.replace(medium=medium), air_surfaces, media)
 texts = st.text(st.characters(codec="utf-8"), max_size=30)
 

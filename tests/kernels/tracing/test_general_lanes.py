@@ -20,6 +20,7 @@ KINDS = {
     "centred": {},
     "moved": {"decentre": (0.2, -0.1), "tilt_deg": (0.5, -0.3)},
     "asphere": {"conic": 0.3, "asphere": (1e-5, -2e-7, 3e-10)},
+    "odd asphere": {"conic": 0.3, "asphere": (1e-5,), "odd_asphere": (2e-4, -3e-6, 1e-10)},
     "cylinder": {"curvature_x": 0.0},
     "zernike": {"figure": Figure(zernike_nm=((5, 300.0), (9, -80.0), (28, 40.0)))},
     "image": {"figure": Figure(heights=BUMPS, image="bumps.png", peak_valley_nm=200.0)},

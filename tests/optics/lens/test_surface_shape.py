@@ -46,6 +46,8 @@ ROWS = {
     "sphere": {"figure": Figure()},
     "conic": {"conic": -0.8, "figure": Figure()},
     "asphere": {"conic": 0.3, "asphere": (1e-5, -2e-7, 3e-10)},
+    "odd asphere": {"conic": 0.3, "asphere": (1e-5,), "odd_asphere": (2e-4, -3e-6, 0.0, 1e-10)},
+    "odd asphere of a plane": {"curvature": 0.0, "odd_asphere": (2e-4,)},
     "cylinder": {"curvature_x": 0.0},
     "cylinder across": {"curvature": 0.0, "curvature_x": 0.03, "conic_x": -2.0},
     "toroid": {"curvature_x": -0.02, "conic_x": 1.5, "conic": -0.5},
@@ -80,8 +82,9 @@ def test_gradients_are_differences_of_the_sag(name):
         assert room > 0.0
 
 
-def test_an_asphere_goes_on_smoothly_beyond_its_rim():
-    a_lens = shaped(asphere=(1e-5, 0.0, 0.0, 0.0, 0.0, 0.0, 1e-18))
+@pytest.mark.parametrize("terms", ["asphere", "odd_asphere"])
+def test_an_asphere_goes_on_smoothly_beyond_its_rim(terms):
+    a_lens = shaped(**{terms: (1e-5, 0.0, 0.0, 0.0, 0.0, 0.0, 1e-18)})
     table = shape_table(a_lens)
     at = 1.1 * a_lens.rows[0].semi_diameter
     inside, outside = (sag_of_shape(table, 0, 0.0, at * f) for f in (1.0 - 1e-9, 1.0 + 1e-9))
@@ -109,6 +112,8 @@ def test_what_is_one_of_revolution():
     assert shape_table(lens(TRIPLET, 5.0)) is None
     assert has_rotational_symmetry(shaped(asphere=(1e-6,)))
     assert shape_table(shaped(asphere=(1e-6,))) is not None
+    assert has_rotational_symmetry(shaped(odd_asphere=(1e-6,)))
+    assert shape_table(shaped(odd_asphere=(1e-6,))) is not None
     assert has_rotational_symmetry(shaped(decentre=(0.0, 0.0), tilt_deg=(0.0, 0.0)))
     assert shape_table(shaped(decentre=(0.0, 0.0))) is None
     for fields in ({"curvature_x": 0.0}, {"decentre": (0.1, 0.0)}, {"tilt_deg": (0.0, 1.0)}, {"figure": Figure()}):

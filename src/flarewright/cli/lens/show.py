@@ -171,6 +171,7 @@ def _shape(row: Surface) -> str | None:
         radius = "flat" if curvature == 0.0 else f"{1.0 / curvature:.3f}"
         words.append(f"{radius} across" + (f", conic {conic:g}" if conic else ""))
     words += [f"A{4 + 2 * k} {term:g}" for k, term in enumerate(row.asphere) if term]
+    words += [f"A{3 + 2 * k} {term:g}" for k, term in enumerate(row.odd_asphere) if term]
     if any(row.decentre or ()):
         words.append("decentred {:g}, {:g}".format(*(row.decentre or ())))
     if any(row.tilt_deg or ()):

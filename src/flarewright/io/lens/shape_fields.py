@@ -64,6 +64,14 @@ def read_shape(entry: dict[str, Any], where: str, folder: Path | None, problems:
             problems.append(f"{where}: asphere has {len(terms)} terms: give 1 to {MOST_TERMS}, A4 first, A6 next, ...")
         elif terms is not None:
             values["asphere"] = terms
+    if "odd_asphere" in entry:
+        terms = _numbers(entry["odd_asphere"], f"{where}: odd_asphere", TERM, problems)
+        if terms is not None and not 1 <= len(terms) <= MOST_TERMS:
+            problems.append(
+                f"{where}: odd_asphere has {len(terms)} terms: give 1 to {MOST_TERMS}, A3 first, A5 next, ..."
+            )
+        elif terms is not None:
+            values["odd_asphere"] = terms
     values |= _moved(entry, where, problems)
     if "figure" in entry:
         values["figure"] = _figure(entry["figure"], f"{where}: figure", folder, problems)
@@ -220,7 +228,7 @@ def shape_parts(row: Surface, number: Any, quoted: Any, radius: Any) -> list[str
         parts.append(radius(row.curvature_x, "_x"))
     if row.conic_x is not None:
         parts.append(f"conic_x = {number(row.conic_x)}")
-    for key in ("asphere", "decentre", "tilt_deg"):
+    for key in ("asphere", "odd_asphere", "decentre", "tilt_deg"):
         values = getattr(row, key)
         if values:
             parts.append(f"{key} = [{', '.join(map(number, values))}]")
@@ -250,6 +258,13 @@ def shape_schema() -> dict[str, Any]:
             "maxItems": MOST_TERMS,
             "items": TERM.schema(),
             "description": "A4, A6, ... of the sag's even terms, 1/mm^3, 1/mm^5, ...",
+        },
+        "odd_asphere": {
+            "type": "array",
+            "minItems": 1,
+            "maxItems": MOST_TERMS,
+            "items": TERM.schema(),
+            "description": "A3, A5, ... of the sag's odd terms, 1/mm^2, 1/mm^4, ...",
         },
         "decentre": {**pair, "items": OFFSET.schema(), "description": "x and y offset of the vertex from the axis, mm"},
         "tilt_deg": {**pair, "items": TILT.schema(), "description": "rotation about x, then about y, at the vertex"},

@@ -329,7 +329,7 @@ def _surface(
     if semi is not None and surface.lifted > MOST_LIFTED * semi:
         problems.append(
             f"row {k}: the asphere's terms raise its rim by {surface.lifted:.3g} mm, more than its semi_diameter of "
-            f"{semi:g} mm: check their units (1/mm^3, 1/mm^5, ...)"
+            f"{semi:g} mm: check their units (A4 in 1/mm^3, A6 in 1/mm^5, ...)"
         )
         return None
     return surface

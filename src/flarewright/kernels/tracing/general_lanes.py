@@ -21,6 +21,8 @@ from .intersect import (
     DEGREE,
     KIND,
     NEWTON_STEPS,
+    ODD,
+    ODD_COUNT,
     ORIGIN,
     POLYNOMIAL,
     SAG,
@@ -214,6 +216,8 @@ def _sags(shapes, row, alive, work):
             terms = k + 1
     if terms > 0:
         _aspheres(shapes, row, terms, work)
+    if shapes[row, ODD_COUNT] > 0.0:
+        _odd_aspheres(shapes, row, work)
     if shapes[row, DEGREE] >= 0.0 or shapes[row, SIDE] > 0.0:
         _figures(shapes, row, alive, work)
 
@@ -262,6 +266,27 @@ def _aspheres(shapes, row, terms, work):
         x, y, at = work[AT_X, m], work[AT_Y, m], work[THREE, m]
         slope = at * (2.0 * work[ONE, m] + at * work[TWO, m])
         work[SAGS, m] += at * at * work[ONE, m] + (x * x + y * y - at) * slope
+        work[GX, m] += 2.0 * x * slope
+        work[GY, m] += 2.0 * y * slope
+
+
+@inlined
+def _odd_aspheres(shapes, row, work):
+    """Add the odd aspheres of all lanes (`kernels.tracing.intersect`); x and y are in AT_X and AT_Y."""
+    tangent = shapes[row, TANGENT]
+    for m in range(LANES):
+        work[ONE, m], work[TWO, m] = 0.0, 0.0
+        work[THREE, m] = min(work[AT_X, m] * work[AT_X, m] + work[AT_Y, m] * work[AT_Y, m], tangent)
+    for k in range(int(shapes[row, ODD_COUNT]) - 1, -1, -1):
+        term = shapes[row, ODD + k]
+        for m in range(LANES):
+            work[TWO, m] = work[TWO, m] * work[THREE, m] + work[ONE, m]
+            work[ONE, m] = work[ONE, m] * work[THREE, m] + term
+    for m in range(LANES):
+        x, y, at = work[AT_X, m], work[AT_Y, m], work[THREE, m]
+        root = sqrt(at)
+        slope = root * (1.5 * work[ONE, m] + at * work[TWO, m])
+        work[SAGS, m] += root * at * work[ONE, m] + (x * x + y * y - at) * slope
         work[GX, m] += 2.0 * x * slope
         work[GY, m] += 2.0 * y * slope
 

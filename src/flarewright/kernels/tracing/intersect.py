@@ -21,7 +21,9 @@ DEGREE = 28  # degree of that polynomial; -1: none
 POLYNOMIAL = 29  # coefficient of x^i y^j at 7 i + j
 SIDE = 78  # knots per side of the height image; 0: none
 HALF = 79  # the image spans [-HALF, HALF], mm
-HEIGHTS = 80  # row by row in x
+ODD_COUNT = 80  # number of odd terms; 0: none
+ODD = 81  # A3, A5, ...; as many as even ones
+HEIGHTS = 90  # row by row in x
 
 CENTRED, CONIC, SAG = 0.0, 1.0, 2.0
 
@@ -124,6 +126,24 @@ def _asphere(shapes, row, x, y):
 
 
 @inner
+def _odd_asphere(shapes, row, x, y):
+    """Return the odd asphere's sum A3 r^3 + A5 r^5 + ... and its gradient; beyond TANGENT as `_asphere` does.
+
+    It is r^3 times a polynomial in q = r^2, with the slope r (1.5 value + q slope) in q: smooth on the axis.
+    """
+    r2 = x * x + y * y
+    at = min(r2, shapes[row, TANGENT])
+    root = sqrt(at)
+    value, slope = 0.0, 0.0
+    for k in range(int(shapes[row, ODD_COUNT]) - 1, -1, -1):
+        slope = slope * at + value
+        value = value * at + shapes[row, ODD + k]
+    slope = root * (1.5 * value + at * slope)
+    value = root * at * value + (r2 - at) * slope
+    return value, 2.0 * x * slope, 2.0 * y * slope
+
+
+@inner
 def _polynomial(shapes, row, x, y):
     """Return the figure's polynomial in x / radius and y / radius, in mm, and its gradient."""
     scale = shapes[row, SCALE]
@@ -200,8 +220,8 @@ def sag_of_shape(shapes, row, x, y):
 
     Notes
     -----
-    z = (cx x^2 + cy y^2) / (1 + sqrt(room)) + A4 r^4 + A6 r^6 + ... + figure: the biconic form. It is a conic of
-    revolution if both meridians are equal and a conic cylinder if one is straight.
+    z = (cx x^2 + cy y^2) / (1 + sqrt(room)) + A4 r^4 + A6 r^6 + ... + A3 r^3 + A5 r^5 + ... + figure: the biconic form.
+    It is a conic of revolution if both meridians are equal and a conic cylinder if one is straight.
     """
     cx, cy = shapes[row, CURVATURE_X], shapes[row, CURVATURE_Y]
     qx, qy = (1.0 + shapes[row, CONIC_X]) * cx * cx, (1.0 + shapes[row, CONIC_Y]) * cy * cy
@@ -215,6 +235,9 @@ def sag_of_shape(shapes, row, x, y):
     slope_x, slope_y = 2.0 * cx * x * below + bend * qx * x, 2.0 * cy * y * below + bend * qy * y
     value, along_x, along_y = _asphere(shapes, row, x, y)
     sag, slope_x, slope_y = sag + value, slope_x + along_x, slope_y + along_y
+    if shapes[row, ODD_COUNT] > 0.0:
+        value, along_x, along_y = _odd_asphere(shapes, row, x, y)
+        sag, slope_x, slope_y = sag + value, slope_x + along_x, slope_y + along_y
     if shapes[row, DEGREE] >= 0.0:
         value, along_x, along_y = _polynomial(shapes, row, x, y)
         sag, slope_x, slope_y = sag + value, slope_x + along_x, slope_y + along_y

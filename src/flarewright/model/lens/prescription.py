@@ -39,6 +39,9 @@ class Surface(Frozen):
         The same in the x-z plane; None: as in the y-z plane. A cylinder has one curvature that is 0.
     asphere : tuple of float
         A4, A6, ... of the sag's terms A4 r^4 + A6 r^6 + ..., 1/mm^3, 1/mm^5, ...
+    odd_asphere : tuple of float
+        A3, A5, ... of the sag's terms A3 r^3 + A5 r^5 + ..., 1/mm^2, 1/mm^4, ...; a term of r would be a tip without a
+        normal on the axis.
     decentre : tuple of float or None
         (x, y) of the vertex beside the axis, mm.
     tilt_deg : tuple of float or None
@@ -63,6 +66,7 @@ class Surface(Frozen):
     curvature_x: float | None = None
     conic_x: float | None = None
     asphere: tuple[float, ...] = Field((), max_length=MOST_TERMS)
+    odd_asphere: tuple[float, ...] = Field((), max_length=MOST_TERMS)
     decentre: tuple[Offset, Offset] | None = None
     tilt_deg: tuple[Tilt, Tilt] | None = None
     figure: Figure | None = None
@@ -95,7 +99,13 @@ class Surface(Frozen):
     def lifted(self) -> float:
         """Largest departure of the asphere terms from the conic at the rim, mm; 0 for an unknown semi-diameter."""
         semi = self.semi_diameter or 0.0
-        return abs(sum(term * semi ** (2 * k + 4) for k, term in enumerate(self.asphere)))
+        return abs(sum(term * semi**power for power, term in self.terms.items()))
+
+    @property
+    def terms(self) -> dict[int, float]:
+        """Coefficients of its aspheric terms by the power of r; those that are 0 are left out."""
+        even = {2 * k + 4: term for k, term in enumerate(self.asphere) if term}
+        return even | {2 * k + 3: term for k, term in enumerate(self.odd_asphere) if term}
 
     @property
     def displaced(self) -> bool:

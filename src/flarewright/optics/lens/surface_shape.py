@@ -20,6 +20,8 @@ from ...kernels.tracing.intersect import (
     HALF,
     HEIGHTS,
     KIND,
+    ODD,
+    ODD_COUNT,
     ORIGIN,
     POLYNOMIAL,
     SAG,
@@ -109,6 +111,8 @@ def sag(row: Surface | Stop, x: Floats, y: Floats) -> Floats:
     r2 = x**2 + y**2
     for k, term in enumerate(row.asphere):
         found = found + term * r2 ** (k + 2)
+    for k, term in enumerate(row.odd_asphere):
+        found = found + term * r2 ** (k + 1.5)
     return found
 
 
@@ -129,7 +133,9 @@ def shape_table(lens: Lens) -> Floats | None:
     LensError
         When the image of a figure has not been read, or a row with a figure error has no semi-diameter.
     """
-    if has_rotational_symmetry(lens) and not any(isinstance(row, Surface) and row.asphere for row in lens.rows):
+    if has_rotational_symmetry(lens) and not any(
+        isinstance(row, Surface) and (row.asphere or row.odd_asphere) for row in lens.rows
+    ):
         return None
     most = max((len(_heights(row)) ** 2 for row in lens.rows), default=0)
     table = np.zeros((len(lens.rows), HEIGHTS + most))
@@ -145,8 +151,12 @@ def shape_table(lens: Lens) -> Floats | None:
         entry[CURVATURE_X], entry[CONIC_X] = row.meridian_x
         entry[CURVATURE_Y], entry[CONIC_Y] = row.curvature, row.conic
         moved = bool(np.any(origin != 0.0) or np.any(axes != np.eye(3)))
-        entry[KIND] = SAG if row.asphere or not is_surface_of_revolution(row) else CONIC if moved else CENTRED
+        entry[KIND] = (
+            SAG if row.asphere or row.odd_asphere or not is_surface_of_revolution(row) else CONIC if moved else CENTRED
+        )
         entry[ASPHERE : ASPHERE + len(row.asphere)] = row.asphere
+        entry[ODD_COUNT] = len(row.odd_asphere)
+        entry[ODD : ODD + len(row.odd_asphere)] = row.odd_asphere
         if row.semi_diameter is not None:
             entry[TANGENT] = (ROOM * row.semi_diameter) ** 2
         if row.figure is not None:

@@ -12,6 +12,7 @@ from flarewright.errors import LensError
 from flarewright.model import Stop
 from flarewright.optics.lens.paraxial import first_order
 from flarewright.render.scene.resolve import open_lens
+from flarewright.workflow.lens_export import export_lens
 
 GLASS = {"type": "AbbeMaterial", "index": 1.6, "abbe": 60.0}
 AIR = {"type": "IdealMaterial", "index": 1.0, "absorp": 0.0}
@@ -70,6 +71,22 @@ def test_the_numbers_of_the_file(tmp_path):
         slope = (before * slope - (after - before) * curvature * h) / after
         h, before = h + slope * gap, after
     assert first_order(lens).efl == pytest.approx(-1.0 / slope, rel=1e-12)
+
+
+def test_an_odd_asphere_has_the_terms_of_r(tmp_path):
+    data = copy.deepcopy(LENS)
+    geometry = data["surface_group"]["surfaces"][1]["geometry"]
+    geometry |= {"type": "OddAsphere", "coefficients": [0.0, 0.0, 3e-5, 1e-6, 0.0, -2e-9, 1e-11]}
+    lens = opened(tmp_path, data).lens
+    assert lens.rows[0].terms == {3: 3e-5, 4: 1e-6, 6: -2e-9, 7: 1e-11}
+    export_lens(lens, tmp_path / "again.json")
+    written = json.loads((tmp_path / "again.json").read_text())["surface_group"]["surfaces"][1]["geometry"]
+    assert (written["type"], written["coefficients"]) == ("OddAsphere", geometry["coefficients"])
+    assert open_lens(tmp_path / "again.json").lens.rows[0].terms == lens.rows[0].terms
+    for wrong in ([1e-4], [0.0, 1e-4], ["x"], 3.0, [0.0] * 21):
+        geometry["coefficients"] = wrong
+        with pytest.raises(LensError, match="surface 1: its coefficients must be numbers of r and r"):
+            opened(tmp_path, data)
 
 
 def test_a_near_object_and_what_is_left_out(tmp_path):

@@ -16,6 +16,7 @@ from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.surface_shape import sag
 from flarewright.optics.lens.zoom import positioned
 from flarewright.render.scene.resolve import load_lens
+from flarewright.workflow.lens_export import export_lens
 
 HEAD = """\
 VERS 140124 258 36214
@@ -401,11 +402,59 @@ def test_odd_aspheres_without_odd_powers_and_cylinders(tmp_path):
     np.testing.assert_allclose(sag(rows[4], 3 * r, r), ellipse, rtol=1e-12)
 
 
+def test_odd_powers_are_read_and_written(tmp_path):
+    odd = surface(1, 0.01, 4.0, "N-BK7 0 0 1.5 40", "6 1", "ODDASPHE", ["PARM 3 1E-4", "PARM 4 1E-5", "PARM 7 2E-8"])
+    scaled = surface(
+        2, -0.01, 2.0, "", "6 1", "XOSPHERE",
+        ["CONI -0.5", "XDAT 1 10", "XDAT 2 10.0", "XDAT 5 0.1", "XDAT 8 0.5", "XDAT 11 3.0"],
+    )  # fmt: skip
+    tail = (surface(3, 0.0, 20.0, more=["STOP"]), surface(4))
+    lens = loaded(write(tmp_path, text_of(odd, scaled, *tail)))[0]
+    r = np.array([0.0, 1.0, 3.0, 5.0])
+    sphere = 0.01 * r**2 / (1 + np.sqrt(1 - 0.01**2 * r**2))
+    np.testing.assert_allclose(
+        sag(lens.rows[0], r, 0 * r), sphere + 1e-4 * r**3 + 1e-5 * r**4 + 2e-8 * r**7, rtol=1e-12
+    )
+    conic = -0.01 * r**2 / (1 + np.sqrt(1 - 0.5 * 0.01**2 * r**2))
+    terms = 0.1 * (r / 10) ** 3 + 0.5 * (r / 10) ** 6 + 3 * (r / 10) ** 9
+    np.testing.assert_allclose(sag(lens.rows[1], 0 * r, r), conic + terms, rtol=1e-12)
+    # inches
+    inches = loaded(write(tmp_path, text_of(odd, scaled, *tail, unit="IN")))[0]
+    wide = 25.4 * r
+    for one, other in zip(lens.rows[:2], inches.rows[:2], strict=True):
+        np.testing.assert_allclose(sag(other, wide, 0 * r), 25.4 * sag(one, r, 0 * r), rtol=1e-12)
+    # both types, and our own format
+    for name in ("again.zmx", "again.toml"):
+        export_lens(lens, tmp_path / name)
+        again = loaded(tmp_path / name)[0]
+        assert [row.terms for row in again.rows[:2]] == [row.terms for row in lens.rows[:2]]
+    written = (tmp_path / "again.zmx").read_text()
+    assert "TYPE ODDASPHE" in written
+    assert "TYPE XOSPHERE" in written
+    for name in ("again.csv", "again.lens"):
+        with pytest.raises(LensError, match="row 0"):
+            export_lens(lens, tmp_path / name)
+        assert not (tmp_path / name).exists()
+
+
+def test_an_odd_asphere_of_even_powers_is_an_even_one(tmp_path):
+    rest = (surface(2, 0.0, 2.0), surface(3, 0.0, 20.0, more=["STOP"]), surface(4))
+    glass = "N-BK7 0 0 1.5 40"
+    even = surface(1, 0.01, 4.0, glass, "6 1", "EVENASPH", ["CONI -0.5", "PARM 2 1E-5", "PARM 3 -2E-8"])
+    odd = surface(1, 0.01, 4.0, glass, "6 1", "ODDASPHE", ["CONI -0.5", "PARM 4 1E-5", "PARM 6 -2E-8"])
+    extended = ["CONI -0.5", "XDAT 1 6", "XDAT 2 1.0", "XDAT 6 1E-5", "XDAT 8 -2E-8"]
+    wanted = loaded(write(tmp_path, text_of(even, *rest)))[0]
+    assert loaded(write(tmp_path, text_of(odd, *rest)))[0] == wanted
+    assert (
+        loaded(write(tmp_path, text_of(surface(1, 0.01, 4.0, glass, "6 1", "XOSPHERE", extended), *rest)))[0] == wanted
+    )
+
+
 @pytest.mark.parametrize(
     ("kind", "curvature", "more", "said"),
     [
-        ("ODDASPHE", 0.01, ["PARM 3 1E-4"], r"surface 1 is of type ODDASPHE with odd powers \(r\^3\)"),
-        ("XOSPHERE", 0.01, ["XDAT 1 5", "XDAT 7 1E-4"], r"of type XOSPHERE with odd powers \(r\^5\)"),
+        ("ODDASPHE", 0.01, ["PARM 1 1E-4"], "surface 1 has a term of r, a tip without a normal on the axis"),
+        ("XOSPHERE", 0.01, ["XDAT 1 21", "XDAT 23 1E-40"], r"surface 1 has terms beyond r\^19"),
         ("XOSPHERE", 0.01, ["XDAT 1 3", "XDAT 6 1E-4"], "XDAT 6 lies beyond the number of terms"),
         ("TOROIDAL", 0.01, ["PARM 1 40"], "surface 1 is a toroid with a curvature in both meridians"),
         ("TOROIDAL", 0.01, ["PARM 3 1E-4"], r"surface 1 is a toroid with terms \(PARM 3\)"),

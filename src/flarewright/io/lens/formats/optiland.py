@@ -1,9 +1,9 @@
 """Lenses of Optiland (`.json`): reader and writer.
 
 The file holds `aperture`, `fields` and `surface_group`, whose surfaces have a geometry (Plane, StandardGeometry,
-EvenAsphere or BiconicGeometry with a position `cs`), the material behind (AbbeMaterial, Material or IdealMaterial),
-`is_stop` and `aperture`. Object and image are surfaces, too. Source: files that the program saves, and its
-documentation.
+EvenAsphere, OddAsphere or BiconicGeometry with a position `cs`), the material behind (AbbeMaterial, Material or
+IdealMaterial), `is_stop` and `aperture`. Object and image are surfaces, too. Source: files that the program saves, and
+its documentation.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ..medium_names import numbered_medium
 
 _ROUNDED = 1e-6
 _WAVELENGTHS_UM = (0.4861327, 0.5875618, 0.6562725)
-_GEOMETRIES = ("Plane", "StandardGeometry", "EvenAsphere", "BiconicGeometry")
+_GEOMETRIES = ("Plane", "StandardGeometry", "EvenAsphere", "OddAsphere", "BiconicGeometry")
 _FREE = {"type": "IdealMaterial", "propagation_model": {"class": "HomogeneousPropagation"}, "index": 1.0, "absorp": 0.0}
 _Findings = list[tuple[int, media.Finding]]
 
@@ -176,6 +176,15 @@ def _shape(where: str, kind: str, geometry: Mapping[str, Any], problems: list[st
                 f"{where}: its coefficients must be numbers of r^2, which must be 0, to r^{2 * MOST_TERMS + 2}"
             )
         values["asphere"] = tuple(value or 0.0 for value in numbers[1 : MOST_TERMS + 1])
+    elif kind == "OddAsphere":
+        terms = geometry.get("coefficients", [])
+        numbers = [json_number(value) for value in terms] if isinstance(terms, list) else [None]
+        if None in numbers or len(numbers) > 2 * MOST_TERMS + 2 or any(numbers[:2]):
+            problems.append(
+                f"{where}: its coefficients must be numbers of r and r^2, which must be 0, to r^{2 * MOST_TERMS + 2}"
+            )
+        values["odd_asphere"] = tuple(value or 0.0 for value in numbers[2 : 2 * MOST_TERMS + 2 : 2])
+        values["asphere"] = tuple(value or 0.0 for value in numbers[3 : 2 * MOST_TERMS + 2 : 2])
     return values
 
 
@@ -290,7 +299,7 @@ def _geometry(k: int, row: Surface, z: float) -> dict[str, Any]:
     radius = 1.0 / row.curvature if row.curvature else math.inf
     steps = {"tol": 1e-10, "max_iter": 100}
     if row.toroidal:
-        if any(row.asphere):
+        if row.terms:
             raise LensError(
                 f"row {k} has different curvatures in its meridians and aspheric terms, which a .json cannot hold"
             )
@@ -298,6 +307,12 @@ def _geometry(k: int, row: Surface, z: float) -> dict[str, Any]:
         return {
             "type": "BiconicGeometry", "cs": _place(z), **steps, "radius_x": 1.0 / across if across else math.inf,
             "radius_y": radius, "conic_x": conic, "conic_y": row.conic,
+        }  # fmt: skip
+    if any(row.odd_asphere):
+        # its terms are those of r, r^2, r^3, ...
+        return {
+            "type": "OddAsphere", "cs": _place(z), "radius": radius, "conic": row.conic, **steps,
+            "coefficients": [row.terms.get(n, 0.0) for n in range(1, max(row.terms) + 1)],
         }  # fmt: skip
     if any(row.asphere):
         return {

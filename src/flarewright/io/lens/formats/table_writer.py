@@ -34,9 +34,14 @@ def csv_text(lens: Lens, sensor_distance: float, stop_semi_diameter: float) -> s
     Raises
     ------
     LensError
-        A surface has different curvatures in its meridians.
+        A surface has different curvatures in its meridians, or odd aspheric terms.
     """
     _refuse_toroids(lens, ".csv")
+    for k, row in enumerate(lens.rows):
+        if isinstance(row, Surface) and any(row.odd_asphere):
+            raise LensError(
+                f"row {k} has odd aspheric terms, which a .csv file cannot hold; write a .zmx or .toml file"
+            )
     terms = max((len(row.asphere) for row in lens.rows if isinstance(row, Surface)), default=0)
     conic = any(isinstance(row, Surface) and row.conic for row in lens.rows)
     text = io.StringIO()
@@ -85,7 +90,7 @@ def dotlens_text(lens: Lens, focal_length: float, sensor_distance: float, stop_s
     """
     _refuse_toroids(lens, ".lens")
     for k, row in enumerate(lens.rows):
-        if isinstance(row, Surface) and (row.conic or any(row.asphere)):
+        if isinstance(row, Surface) and (row.conic or row.terms):
             raise LensError(f"row {k} is no sphere, and .lens tables hold spheres only; write a .zmx or .csv file")
     name = " ".join(lens.name.replace("#", " ").split())
     glass = sum(isinstance(row, Surface) and row.medium is not None for row in lens.rows)

@@ -212,6 +212,7 @@ def _shape(block: Block, mm: float, found: Text) -> dict[str, object]:
         }  # fmt: skip
     if block.kind == "TOROIDAL":
         return _toroid(block, curvature, conic, mm, problems)
+    odd: dict[int, float] = {}
     if block.kind == "EVENASPH":
         terms = {n: block.parameters.get(n, 0.0) for n in block.parameters if n > 0}
     elif block.kind == "XASPHERE":
@@ -224,29 +225,33 @@ def _shape(block: Block, mm: float, found: Text) -> dict[str, object]:
             problems.append(f"{where} has different terms in PARM and in XDAT: remove those that are wrong")
         terms |= plain
     elif block.kind in ("ODDASPHE", "XOSPHERE"):
-        terms = _even_terms(block, problems)
+        terms, odd = _even_and_odd(block, problems)
     else:
         problems.append(
             f"{where} is of type {block.kind[:40]}; known are STANDARD, EVENASPH, XASPHERE, BICONICX, TOROIDAL, "
             "ODDASPHE, XOSPHERE and an idle COORDBRK"
         )
         return {}
-    return _asphere(where, curvature, conic, {n: value / mm ** (2 * n - 1) for n, value in terms.items()}, problems)
+    values = _asphere(where, curvature, conic, {n: value / mm ** (2 * n - 1) for n, value in terms.items()}, problems)
+    if odd:
+        values["odd_asphere"] = tuple(odd.get(n, 0.0) / mm ** (n - 1) for n in range(3, max(odd) + 1, 2))
+    return values
 
 
-def _even_terms(block: Block, problems: list[str]) -> dict[int, float]:
-    """Return the terms of r^2, r^4, ... of an odd asphere; refuse odd powers, which no surface of a lens has here."""
-    unit = block.extra.get(2, 1.0) or 1.0
+def _even_and_odd(block: Block, problems: list[str]) -> tuple[dict[int, float], dict[int, float]]:
+    """Return an odd asphere's terms: even ones by half the power of r, odd ones by the power."""
+    where, unit = f"surface {block.number}", block.extra.get(2, 1.0) or 1.0
     powers = {n - 2: value / unit ** (n - 2) for n, value in block.extra.items() if n > 2}
     if beyond := [n + 2 for n, value in powers.items() if value and n > block.extra.get(1, 0.0)]:
-        problems.append(f"surface {block.number}: XDAT {beyond[0]} lies beyond the number of terms that XDAT 1 states")
+        problems.append(f"{where}: XDAT {beyond[0]} lies beyond the number of terms that XDAT 1 states")
     powers |= {n: value for n, value in block.parameters.items() if n > 0 and value}
-    if odd := [f"r^{n}" for n, value in powers.items() if n % 2 and value]:
-        problems.append(
-            f"surface {block.number} is of type {block.kind} with odd powers ({', '.join(odd[:4])}), which are not "
-            "supported: fit an even asphere to it"
-        )
-    return {n // 2: value for n, value in powers.items() if n % 2 == 0 and value}
+    powers = {n: value for n, value in powers.items() if value}
+    if 1 in powers:
+        problems.append(f"{where} has a term of r, a tip without a normal on the axis, which is not supported")
+    odd = {n: value for n, value in powers.items() if n % 2 and n > 1}
+    if any(n > 2 * MOST_TERMS + 1 for n in odd):
+        problems.append(f"{where} has terms beyond r^{2 * MOST_TERMS + 1}, which are not supported")
+    return {n // 2: value for n, value in powers.items() if n % 2 == 0}, odd
 
 
 def _toroid(block: Block, curvature: float, conic: float, mm: float, problems: list[str]) -> dict[str, object]:

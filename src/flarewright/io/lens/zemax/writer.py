@@ -1,7 +1,8 @@
 """Write a lens as a sequential Zemax file (`.zmx`) that `reader.read_zmx` reads back.
 
-Surfaces are of the types STANDARD, EVENASPH and BICONICX, positions become configurations (THIC, APER, YFIE). A glass
-is named where the catalogue has the row's index, else it is written by its n_d and V_d. Source: as for `reader`.
+Surfaces are of the types STANDARD, EVENASPH, ODDASPHE, XOSPHERE and BICONICX, positions become configurations (THIC,
+APER, YFIE). A glass is named where the catalogue has the row's index, else it is written by its n_d and V_d. Source: as
+for `reader`.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ _SAME_INDEX = 1e-6
 _SAME_ABBE = 0.01
 # aspheric terms from r^4 on: Zemax's even asphere has eight, from r^2 to r^16
 _MOST_TERMS = 7
+# its odd asphere those of r to r^8; the extended one has as many as it states
+_MOST_ODD_POWER = 8
 
 
 class LensState(NamedTuple):
@@ -125,15 +128,25 @@ def _surface(
             *lines, "  STOP", "  TYPE STANDARD", '  CURV 0.0 0 0 0 0 ""', f"  DISZ {gap!r}",
             f'  DIAM {stop_semi!r} 0 0 0 1 ""',
         ]  # fmt: skip
-    if row.toroidal and any(row.asphere):
+    if row.toroidal and row.terms:
         raise LensError(f"row {k} has different curvatures in its meridians and aspheric terms, which .zmx cannot hold")
-    if len(row.asphere) > _MOST_TERMS:
+    odd = any(row.odd_asphere)
+    if len(row.asphere) > _MOST_TERMS and not odd:
         raise LensError(f"row {k} has aspheric terms above r^16, which .zmx cannot hold; write a .toml or .json file")
+    extended = odd and max(row.terms) > _MOST_ODD_POWER
     kind = "BICONICX" if row.toroidal else "EVENASPH" if any(row.asphere) else "STANDARD"
+    if odd:
+        kind = "XOSPHERE" if extended else "ODDASPHE"
     lines += [f"  TYPE {kind}", f'  CURV {row.curvature!r} 0 0 0 0 ""', f"  CONI {row.conic!r}"]
     if row.toroidal:
         across, conic = row.meridian_x
         lines += [f"  PARM 1 {1.0 / across if across else 0.0!r}", f"  PARM 2 {conic!r}"]
+    elif extended:
+        # the number of terms and the radius that r is divided by come first
+        lines += [f"  XDAT 1 {max(row.terms)} 0 0", "  XDAT 2 1.0 0 0"]
+        lines += [f"  XDAT {n + 2} {term!r} 0 0" for n, term in sorted(row.terms.items())]
+    elif odd:
+        lines += [f"  PARM {n} {term!r}" for n, term in sorted(row.terms.items())]
     elif any(row.asphere):
         lines += [f"  PARM {n} {term!r}" for n, term in enumerate((0.0, *row.asphere), 1)]
     lines.append(f"  DISZ {gap!r}")
