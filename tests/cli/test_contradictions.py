@@ -48,6 +48,7 @@ def test_flags_that_contradict_each_other_are_refused(capsys, folder, flags, wor
     ("flags", "words"),
     [
         ("--full-windows", "--full-windows has no effect without layers of single ghosts: add --layers ghosts"),
+        ("--matte-ranks 4", "--matte-ranks has no effect without a matte: add --matte ghosts"),
         ("--order4-limit 1e-3", "--order4-limit has no effect without ghosts of four reflections: add --orders 4"),
     ],
 )

@@ -18,6 +18,7 @@ from ..errors import ProjectError
 from ..io.images.mask_image import read_mask
 from ..kernels.tracing.sequential import REFRACT
 from ..model import Layer, Lens, Project, Stop
+from ..model.matte import GhostMatte
 from ..optics.lens.paths import direct_path, ghost_paths
 from ..optics.lens.surface_shape import ideal
 from ..optics.scattering.sensor_grating import grating_orders
@@ -26,6 +27,7 @@ from .ghosts.cost import CostMeter, RenderProfile
 from .ghosts.ghost_pass import plain_level, render_ghosts
 from .image.compose import beauty
 from .image.gamut import apply_gamut
+from .image.ghost_ranking import RANK_BYTES, GhostRanking, ghost_matte, rank_remarks
 from .image.shown_layer import ShownLayer, shown_layers
 from .scattering.scatter_pass import render_scatter, scatter_facts, scatter_of, without_scattered
 from .scene.arguments import Settings, naming_settings, project_of
@@ -70,6 +72,8 @@ class Rendering:
         The energy ledger, if requested.
     profile : RenderProfile or None
         What each ghost cost, if requested.
+    matte : GhostMatte or None
+        The brightest ghosts of each pixel, with `Output.matte`.
     """
 
     project: Project
@@ -78,6 +82,7 @@ class Rendering:
     remarks: tuple[str, ...]
     ledger: Ledger | None = None
     profile: RenderProfile | None = None
+    matte: GhostMatte | None = None
 
     def _repr_png_(self) -> bytes:
         """Return the beauty as PNG for notebooks, with the display of the PNG beside an EXR."""
@@ -141,8 +146,7 @@ def render(
     """
     project = project_of(project, **settings)
     costs = CostMeter() if profile and project.quality.mode == "final" else None
-    # a lower bound: beauty, ghosts and starburst exist in every render
-    check_memory(prod(project.camera.size_px) * PIXEL_BYTES * (3 if project.output.starburst else 2), spare_bytes())
+    ranking = _checked(project)
     settled = resolve_project(project)
     mask = None if settled.iris.mask is None else read_mask(settled.iris.mask)
     # rules that select no ghost are errors in every quality
@@ -171,7 +175,7 @@ def render(
     else:
         if project.output.starburst and prod(project.camera.size_px) <= PARALLEL_PX:
             starburst = _start_early(starburst, threads)
-        drawn = _ghosts(settled, seen, art, threads, progress, costs, kept)
+        drawn = _ghosts(settled, seen, art, threads, progress, costs, kept, ranking)
     passes = list(drawn.passes)
     scattered: dict[str, Any] = {}
     reported: tuple[str, ...] = ()
@@ -186,11 +190,13 @@ def render(
     with np.errstate(over="ignore", invalid="ignore"):
         passes = [with_gain(layer, art.gain.get(layer.name.removesuffix(".order4"), 1.0)) for layer in passes]
         others = [with_gain(layer, art.gain.get("ghosts", 1.0)) for layer in drawn.others]
+        plain = passes
         passes, others = apply_gamut(project.output.gamut, passes), apply_gamut(project.output.gamut, others)
         whole = beauty(passes, project.camera.size_px)
     layers = (whole,) if project.output.layers == "beauty" else (whole, *passes, *others)
     # the beauty is infinite wherever a pass is
     check_finite((whole, *others))
+    matte = None if ranking is None else _matte(ranking, plain, project, art)
     # line by line: a picture with light ends the search early
     if not any(line.any() for layer in passes for line in layer.pixels):
         reported = (*reported, BLACK if any(shot.share > 0.0 for shot in shots) else HIDDEN)
@@ -209,13 +215,34 @@ def render(
             *drawn.remarks,
             *reported,
             *outside_remarks(shots, images),
+            *(() if matte is None else rank_remarks(matte)),
             *_veil_remarks(drawn.passes),
             *_remarks(settled, seen),
             *_mask_remarks(mask),
         ),
         account if ledger else None,
         None if costs is None else RenderProfile(costs.search_s, costs.costs()),
+        matte,
     )
+
+
+def _checked(project: Project) -> GhostRanking | None:
+    """Check that the picture fits the memory; return an empty ranking if the project asks for a matte."""
+    output, size_px = project.output, project.camera.size_px
+    ranks = output.matte_ranks if output.matte == "ghosts" else 0
+    if ranks and project.quality.mode == "reference":
+        raise ProjectError(
+            "a matte needs each ghost alone, which reference quality does not draw: choose final quality, or no matte"
+        )
+    # a lower bound: beauty, ghosts and starburst exist in every render
+    check_memory(prod(size_px) * (PIXEL_BYTES * (3 if output.starburst else 2) + RANK_BYTES * ranks), spare_bytes())
+    return GhostRanking(size_px, ranks) if ranks else None
+
+
+def _matte(ranking: GhostRanking, passes: Sequence[Layer], project: Project, art: ResolvedArt) -> GhostMatte:
+    """Return the matte of ranked ghosts among the passes, which have their gains."""
+    colorspace = project.output.colorspace
+    return ghost_matte(ranking, passes, project.camera.size_px, colorspace, art.gain.get("ghosts", 1.0))
 
 
 def check_finite(layers: Sequence[Layer]) -> None:
@@ -281,13 +308,14 @@ def _ghosts(
     progress: Progress | None,
     costs: CostMeter | None,
     kept: PartialPicture | None,
+    ranking: GhostRanking | None,
 ) -> _Drawn:
     project = settled.project
     paths = ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None)
     singles = project.output.brightest if project.output.layers == "ghosts" else 0
     ghosts = render_ghosts(
         shots, paths, project.quality, singles=singles, art=art.paths, threads=threads, progress=progress, costs=costs,
-        kept=kept,
+        kept=kept, ranking=ranking,
     )  # fmt: skip
     facts = {
         "drawn": ghosts.drawn,
@@ -312,7 +340,7 @@ def _ghosts(
     if project.quality.mode == "draft":
         return replace(two, remarks=(*reported, "draft quality has no ghosts of four reflections; final quality has"))
     plain = plain_level(shots, paths, threads) if art.paths else ghosts.level
-    four = _fours(settled, shots, (plain, ghosts.level), singles, threads, progress, costs, kept)
+    four = _fours(settled, shots, (plain, ghosts.level), singles, threads, progress, costs, kept, ranking)
     return _Drawn(
         two.passes + four.passes, two.others + four.others, {**two.facts, **four.facts}, two.remarks + four.remarks
     )
@@ -327,6 +355,7 @@ def _fours(
     progress: Progress | None,
     costs: CostMeter | None,
     kept: PartialPicture | None,
+    ranking: GhostRanking | None,
 ) -> _Drawn:
     """Draw the four-reflection ghosts above the limit; `levels` of two-reflection ghosts without and with art."""
     from .reference.four_reflections import find_four_reflections
@@ -338,6 +367,7 @@ def _fours(
     ghosts = render_ghosts(
         shots, found.paths, quality.replace(cull=0.0), singles=singles, art=art.paths, level=levels[1],
         faintest=limit * levels[0], threads=threads, progress=progress, costs=costs, kept=kept,
+        ranking=ranking,
     )  # fmt: skip
     muted = {name for name, changed in art.paths.items() if not changed.enabled}
     dark, part = found.left_out(muted.union(ghosts.names))

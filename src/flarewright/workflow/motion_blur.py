@@ -11,14 +11,16 @@ import numpy as np
 
 from ..measure.replay.measured_project import is_measured
 from ..model import Layer, Project
+from ..model.matte import GhostMatte
 from ..optics.lens.paths import direct_path, ghost_paths
+from ..render.image.ghost_ranking import GhostRanking
 from ..render.scene.opening import make_opening
 from ..render.scene.paraxial_place import ghost_frame
 from ..render.scene.resolve import resolve_project
 from ..render.scene.shots import make_shots
-from ..typing import Floats
+from ..typing import Floats, Pixels
 
-__all__ = ["MOST_SUBFRAMES", "mean_layers", "motion_px", "subframe_count", "subframe_times"]
+__all__ = ["MOST_SUBFRAMES", "MeanMatte", "mean_layers", "motion_px", "subframe_count", "subframe_times"]
 
 MOST_SUBFRAMES = 64
 """Largest number of sub-frames that is chosen automatically."""
@@ -132,6 +134,39 @@ def _lights(project: Project) -> _Places:
         (k, ""): (*(scale * focal * float(np.tan(np.radians(angle))) for angle in light.field_deg), 0.0)  # type: ignore[misc]
         for k, light in enumerate(project.lights)
     }
+
+
+class MeanMatte:
+    """The mean of the mattes of sub-frames, added one after the other.
+
+    Twice as many objects as the matte has are kept at a pixel while it is made: one that is faint in a sub-frame can
+    become one of the brightest.
+
+    Parameters
+    ----------
+    ranks : int
+        Of the mattes, and of their mean.
+    """
+
+    def __init__(self, ranks: int) -> None:
+        self._ranks, self._number = ranks, 0
+        self._ranking: GhostRanking | None = None
+        self._total: Pixels | None = None
+
+    def add(self, matte: GhostMatte) -> None:
+        """Add the matte of a sub-frame."""
+        height, width = matte.total.shape
+        if self._ranking is None or self._total is None:
+            self._ranking, self._total = GhostRanking((width, height), 2 * self._ranks), np.zeros_like(matte.total)
+        self._ranking.merge(matte)
+        self._total += matte.total
+        self._number += 1
+
+    def mean(self) -> GhostMatte | None:
+        """Return the mean; None without a matte."""
+        if self._ranking is None or self._total is None:
+            return None
+        return self._ranking.matte(self._total / np.float32(self._number), self._ranks, 1.0 / self._number)
 
 
 def mean_layers(frames: Iterable[Sequence[Layer]], size_px: tuple[int, int], number: int) -> tuple[Layer, ...]:

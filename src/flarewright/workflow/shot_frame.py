@@ -27,7 +27,7 @@ from ..render.render import render as render_project
 from ..render.scene.resolve import open_lens, resolve_project
 from .frame_files import with_frame_files
 from .keyframes import frame_rate, peak_intensity, project_at, still, time_of
-from .motion_blur import mean_layers, subframe_count, subframe_times
+from .motion_blur import MeanMatte, mean_layers, subframe_count, subframe_times
 
 if TYPE_CHECKING:
     from .plates.plate_sources import PlateShot
@@ -276,13 +276,18 @@ def _draw(moments: tuple[Project, ...], threads: int | None) -> Rendering:
     first = _render(moments[0], threads)
     if len(moments) == 1:
         return first
-    brightest = moments[0].output.brightest if moments[0].output.layers == "ghosts" else None
+    output = moments[0].output
+    brightest = output.brightest if output.layers == "ghosts" else None
+    mattes = MeanMatte(output.matte_ranks) if first.matte is not None else None
 
     def layers() -> Iterator[tuple[Layer, ...]]:
         for k, project in enumerate(moments):
             # which ghosts are the brightest differs between moments: all are averaged, then chosen
             whole = project.replace(output=project.output.replace(brightest=None))
-            yield first.layers if k == 0 and brightest is None else _render(whole, threads).layers
+            drawn = first if k == 0 and brightest is None else _render(whole, threads)
+            if mattes is not None and drawn.matte is not None:
+                mattes.add(drawn.matte)
+            yield drawn.layers
 
     mean = list(mean_layers(layers(), moments[0].camera.size_px, len(moments)))
     if brightest is not None:
@@ -293,7 +298,8 @@ def _draw(moments: tuple[Project, ...], threads: int | None) -> Rendering:
     # a lamp may be switched on after the first moment
     lit = any(layer.pixels.any() for layer in mean)
     remarks = tuple(remark for remark in first.remarks if not (lit and remark == BLACK))
-    return replace(first, layers=tuple(mean), remarks=remarks)  # type: ignore[arg-type]
+    matte = None if mattes is None else mattes.mean()
+    return replace(first, layers=tuple(mean), remarks=remarks, matte=matte)  # type: ignore[arg-type]
 
 
 def _render(project: Project, threads: int | None) -> Rendering:
@@ -340,6 +346,7 @@ def _write(plan: ShotPlan, frame: int, moments: tuple[Project, ...], rendering: 
             one_part=plan.parts == "single",
             compression=project.output.compression,
             attributes=attributes,
+            matte=rendering.matte,
         )
         if plan.plate is not None and plan.over:
             over = FramePattern(plan.over).path(frame)

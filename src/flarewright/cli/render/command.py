@@ -220,6 +220,8 @@ def _without_effect(options: RenderOptions, settings: Project) -> list[str]:
         remarks.append("--full-windows has no effect without layers of single ghosts: add --layers ghosts")
     if options.brightest is not None and settings.output.layers != "ghosts":
         remarks.append("--brightest has no effect without layers of single ghosts: add --layers ghosts")
+    if options.matte_ranks is not None and settings.output.matte == "none":
+        remarks.append("--matte-ranks has no effect without a matte: add --matte ghosts")
     if options.orders == 4 and settings.quality.mode == "draft":
         remarks.append("draft quality draws ghosts of two reflections only: --orders 4 is for final quality")
     if options.ringing == "collins" and settings.quality.mode != "final":
@@ -363,6 +365,7 @@ def _write(
 ) -> tuple[dict[str, Any], list[str]]:
     """Write the EXR and its preview; return the files by kind, and remarks."""
     from ... import __version__
+    from ...io.images.cryptomatte import NAME
     from ...io.images.exr import write_exr
     from ...io.images.half import exr_scale
     from ...io.project.project_file import project_text
@@ -383,6 +386,7 @@ def _write(
             colorspace=project.output.colorspace,
             full_windows=full_windows,
             compression=project.output.compression,
+            matte=rendering.matte,
         )
     )
     outside = negative_share(rendering.layers[0])
@@ -395,6 +399,8 @@ def _write(
         "output": str(output), "layers": [layer.name for layer in rendering.layers], "scale": scale,
         "negative_pixels": outside,
     }  # fmt: skip
+    if rendering.matte is not None:
+        files["matte"] = {"name": NAME, "objects": len(rendering.matte.names), "ranks": len(rendering.matte.light)}
     if look is not None:
         files |= write_preview(rendering, output.with_suffix(".png"), look)
         remarks.append(f"the preview shows {files['view']}")

@@ -66,6 +66,8 @@ _FLAG_OF = {
     "output.brightest": "--brightest",
     "output.colorspace": "--colorspace",
     "output.gamut": "--gamut",
+    "output.matte_ranks": "--matte-ranks",
+    "output.matte": "--matte",
     "intensity": "--intensity",
 }
 
@@ -257,6 +259,8 @@ def _sections(flags: RenderOptions) -> dict[str, dict[str, Any]]:
             "pixel_type": "half" if flags.half else "float" if flags.float32 else None,
             "compression": flags.compression,
             "starburst": False if flags.no_starburst else None,
+            "matte": flags.matte,
+            "matte_ranks": flags.matte_ranks,
         },
     }
 

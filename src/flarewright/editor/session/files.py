@@ -300,7 +300,7 @@ def export_picture(project: Project, path: Path, progress: Progress | None = Non
         path, rendering.layers, project.camera.size_px, pixel_type=project.output.pixel_type,
         scale=exr_scale(project), metadata={"version": __version__, "project": project_text(project)},
         pixel_aspect=rendering.project.camera.pixel_aspect, colorspace=project.output.colorspace,
-        compression=project.output.compression,
+        compression=project.output.compression, matte=rendering.matte,
     )  # fmt: skip
 
 
@@ -319,7 +319,7 @@ def export_comp(project: Project, path: Path, progress: Progress | None = None) 
     if not project.lit_by_plate:
         raise ProjectError("the comp needs the lights of a plate; drop a photograph on the page, and find its lights")
     plate = backplate_shot(project)
-    project = project.replace(output=project.output.replace(layers="passes"))
+    project = project.replace(output=project.output.replace(layers="passes", matte="none"))
     check_comp(project, plate.size_px)
     rendering = render_any(project, progress=progress, limit=True)
     metadata = {"version": __version__, "project": project_text(project)}

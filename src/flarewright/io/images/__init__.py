@@ -1,6 +1,7 @@
 """Image files: EXR, PNG, photographs, and the images that projects refer to.
 
 - `contact_sheet`: `write_contact_sheet`, small pictures on one page and in one picture
+- `cryptomatte`: `matte_layers`, `matte_attributes`, `identifier`, a matte of ghosts as a Cryptomatte
 - `exr`: `write_exr` and `read_exr` for layers; `read_exr_plane`, `read_exr_colour` for any EXR file
 - `exr_attributes`: `shot_attributes`, OpenEXR's standard attributes of a frame
 - `half`: `exr_scale`, `rounded_to_half`, scale and rounding of half floats

@@ -16,6 +16,9 @@ Parts of single ghosts cover only their data window, which keeps files of small 
 fill the picture and 351 of them make large files; `--brightest` limits them. Nuke, Fusion, Natron and OpenImageIO place
 such a part correctly; Blender (up to 5 at least) puts it into the picture's corner. For Blender, `full_windows=True`
 writes every layer at the size of the picture.
+
+The layers of a Cryptomatte (`cryptomatte`) are parts as well, with 32-bit channels R, G, B and A, never scaled. Their
+attributes are in their own parts and in the first one, the only one whose attributes some programs read.
 """
 
 from __future__ import annotations
@@ -36,11 +39,13 @@ from numpy.typing import NDArray
 
 from ...errors import FileError, FlarewrightError, OutputError
 from ...model.layer import Layer
+from ...model.matte import GhostMatte
 from ...model.project.camera import Colorspace
 from ...typing import Floats, Pixels
 from ..files.atomic_write import write_atomically
 from ..files.door import outside, printable, sentences_for, shown
 from ..files.silence_libraries import silenced
+from .cryptomatte import matte_attributes, matte_layers, matte_names
 from .half import HALF_MAX, half_scale, rounded_to_half
 
 # (red x, y, green x, y, blue x, y, white x, y): ITU-R BT.709-6 table 3; ACEScg as S-2014-004, AP1 with the ACES white.
@@ -106,6 +111,7 @@ def write_exr(
     attributes: Mapping[str, Any] | None = None,
     one_part: bool = False,
     compression: Literal["zip", "dwaa"] = "zip",
+    matte: GhostMatte | None = None,
 ) -> tuple[str, ...]:
     """Write layers into one EXR file, atomically.
 
@@ -138,6 +144,8 @@ def write_exr(
     compression : {"zip", "dwaa"}
         zip is lossless. dwaa, for half floats, is lossy (cosine transform, level 45): smaller files, errors that
         pictures do not show. Layers with 32 bits keep their lossless compression, and with `one_part` all do.
+    matte : GhostMatte, optional
+        Written as a Cryptomatte, in further parts of 32-bit floats.
 
     Returns
     -------
@@ -173,11 +181,14 @@ def write_exr(
             # a project can name files whose names are not UTF-8
             header |= {f"{_PREFIX}{name}": printable(text) for name, text in (metadata or {}).items()}
             header |= attributes or {}
+            header |= matte_attributes(matte.names) if matte is not None else {}
         parts.append(
             _part(
                 layer.name, pixels, header, scale, half=pixel_type == "half", first=k == 0, lossy=compression == "dwaa"
             )
         )
+    if matte is not None:
+        parts += _matte_parts(matte, size_px, pixel_aspect)
     if one_part:
         parts = [_joined(parts)]
     if printable(str(path)) != str(path):
@@ -205,6 +216,23 @@ def _part(
     # one array of three channels instead of separate planes halves the memory: "RGB" becomes R, G, B, any other name
     # becomes NAME.R, NAME.G, NAME.B
     return OpenEXR.Part(header, {"RGB" if first else name: values}, name)
+
+
+def _matte_parts(matte: GhostMatte, size_px: tuple[int, int], pixel_aspect: float) -> list[Any]:
+    """Return the parts of a Cryptomatte."""
+    import OpenEXR
+
+    header = {
+        "type": OpenEXR.scanlineimage,
+        # lossless: a changed bit is another object
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "displayWindow": ((0, 0), (size_px[0] - 1, size_px[1] - 1)),
+        "dataWindow": ((0, 0), (size_px[0] - 1, size_px[1] - 1)),
+        "pixelAspectRatio": float(pixel_aspect),
+        _SCALE: 1.0,
+        **matte_attributes(matte.names),
+    }
+    return [OpenEXR.Part(dict(header), {name: pixels}, name) for name, pixels in matte_layers(matte)]
 
 
 def _joined(parts: list[Any]) -> Any:
@@ -270,16 +298,20 @@ def read_exr(path: str | PathLike[str]) -> ExrContents:
 
 
 def _contents(file: Any) -> ExrContents:
-    """Return the layers of a file with R, G and B in each part."""
-    scales = [_scale(part) for part in file.parts]
+    """Return the layers of a file with R, G and B in each part, without those of Cryptomattes."""
+    mattes = matte_names(file.parts[0].header)
+    # a Cryptomatte's identifiers are no light
+    light = [part for k, part in enumerate(file.parts) if k == 0 or not _of_matte(part.name(), mattes)]
+    scales = [_scale(part) for part in light]
     layers = []
-    for k, (part, scale) in enumerate(zip(file.parts, scales, strict=True)):
+    for k, (part, scale) in enumerate(zip(light, scales, strict=True)):
         groups = [("", part.name() or "beauty")] if k == 0 else [(f"{part.name()}.", part.name())]
         if len(file.parts) == 1:
             # a file that `one_part` wrote
             below = dict.fromkeys(name.rpartition(".")[0] for name in part.channels if "." in name)
             # files of others hold more, such as depth.Z
-            groups += [(f"{n}.", n) for n in below if all(f"{n}.{channel}" in part.channels for channel in _CHANNELS)]
+            whole = [n for n in below if all(f"{n}.{channel}" in part.channels for channel in _CHANNELS)]
+            groups += [(f"{n}.", n) for n in whole if not _of_matte(n, mattes)]
         x, y = (int(value) for value in part.header["dataWindow"][0])
         about = _prefixed(part.header, f"{_PREFIX}layer.")
         for prefix, name in groups:
@@ -298,6 +330,11 @@ def _contents(file: Any) -> ExrContents:
     kind: Literal["half", "float"] = "half" if file.parts[0].channels["R"].pixels.dtype == np.float16 else "float"
     size = (int(high[0] - low[0]) + 1, int(high[1] - low[1]) + 1)
     return ExrContents(tuple(layers), size, kind, metadata, header, scales[0])
+
+
+def _of_matte(layer: str, mattes: Sequence[str]) -> bool:
+    """Return whether a layer belongs to one of the Cryptomattes."""
+    return any(layer.startswith(name) and layer.removeprefix(name).isdecimal() for name in mattes)
 
 
 def _open_parts(path: str | PathLike[str], what: str, pixel_bytes: int = 8) -> Any:

@@ -72,6 +72,8 @@ ABOUT = {
     "output.brightest": "20   # number of single ghosts",
     "output.colorspace": '"rec709" or "acescg", linear',
     "output.gamut": '"keep" negative channels, or "compress" colours to avoid them',
+    "output.matte": '"ghosts": a Cryptomatte of the ghosts\' shares of the light, or "none"',
+    "output.matte_ranks": "ghosts that it keeps at a pixel, an even number",
     "output.pixel_type": '"half": 16 bits per value, or "float": 32 bits',
     "output.compression": '"zip": lossless, or "dwaa": lossy and smaller',
 }

@@ -241,6 +241,11 @@ def _refuse_what_lenses_have(project: Project) -> None:
         asked.append('quality.mode = "reference"')
     if project.quality.orders != plain.quality.orders:
         asked.append("quality.orders")
+    if project.output.matte != "none":
+        raise ProjectError(
+            f"{name} is a measured flare, whose residual belongs to no ghost, so it has no matte: leave it out; "
+            "--layers ghosts writes each ghost"
+        )
     if abs(project.camera.pixel_aspect - 1.0) > _OBLONG:
         (width, height), (across, _) = project.camera.size_px, project.camera.sensor
         raise ProjectError(

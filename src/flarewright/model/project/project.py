@@ -149,6 +149,10 @@ class Output(Frozen):
         zip: lossless; dwaa: lossy, smaller files, for half floats only.
     starburst : bool
         Whether the picture includes the direct image of the light with its diffraction pattern.
+    matte : {"none", "ghosts"}
+        ghosts: a Cryptomatte, in which each ghost's coverage is its share of the light of a pixel.
+    matte_ranks : int
+        Ghosts that it keeps at a pixel, those with most light; an even number, two a layer.
     """
 
     layers: Literal["beauty", "passes", "ghosts"] = "passes"
@@ -158,6 +162,15 @@ class Output(Frozen):
     pixel_type: Literal["half", "float"] = "half"
     compression: Literal["zip", "dwaa"] = "zip"
     starburst: StrictBool = True
+    matte: Literal["none", "ghosts"] = "none"
+    matte_ranks: int = Field(8, ge=2, le=64)
+
+    @field_validator("matte_ranks")
+    @classmethod
+    def _two_ranks_a_layer(cls, ranks: int) -> int:
+        if ranks % 2:
+            raise ValueError(f"a layer of a Cryptomatte has two ranks; give an even number, such as {ranks + 1}")
+        return ranks
 
     @model_validator(mode="after")
     def _dwaa_keeps_16_bits(self) -> Output:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise, product
@@ -20,7 +21,8 @@ from ...model import Layer, Quality
 from ...optics.colour.rgb import luminance_weights
 from ...optics.lens.paths import LightPath
 from ...typing import Floats, Mask, Pixels, Progress
-from ..image.canvas import DETAILS, Plane, blank, merge, to_layer
+from ..image.canvas import DETAILS, Plane, blank, lit_window, merge, to_layer
+from ..image.ghost_ranking import GhostRanking, luminance_of
 from ..image.partial_picture import PartialPicture, steps_of
 from ..scene.area_lights import DRAFT_ROUNDING, halvings, motion, spread_border
 from ..scene.art_rules import PLAIN, PathArt
@@ -56,6 +58,8 @@ _DRAFT_CHUNKS = 2
 _BANDS, _BAND_PX = 2, 300_000
 # groups of ghosts that are spread together
 _MOST_CHUNKS = 8
+# ghosts with a separate picture that are drawn ahead of their turn, by the memory of their canvases
+_AHEAD_BYTES, _CANVAS_BYTES = 400_000_000, 30
 # from this number of ghosts on, drafts draw each ghost with no more detail than is visible among the others
 CROWDED_GHOSTS = 200
 # from this number of lights on, the faintest ghosts are left out, up to this part of all ghost light
@@ -132,6 +136,7 @@ def render_ghosts(
     progress: Progress | None = None,
     costs: CostMeter | None = None,
     kept: PartialPicture | None = None,
+    ranking: GhostRanking | None = None,
 ) -> GhostPass:
     """Draw the ghosts of all paths and lights.
 
@@ -157,6 +162,8 @@ def render_ghosts(
         Final quality: gets the time and the work of each ghost.
     kept : PartialPicture, optional
         Final quality: keeps the drawn ghosts in files.
+    ranking : GhostRanking, optional
+        Gets the luminance of each ghost; all are drawn separately then, as for layers of single ghosts.
 
     Returns
     -------
@@ -169,9 +176,9 @@ def render_ghosts(
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         try:
             if quality.mode == "draft":
-                done = _draft(shots, paths, singles, art, pool, meter)
+                done = _draft(shots, paths, singles, art, pool, meter, ranking)
             else:
-                done = _final(shots, paths, quality, singles, art, (level, faintest), pool, meter, costs, kept)
+                done = _final(shots, paths, quality, singles, art, (level, faintest), pool, meter, costs, kept, ranking)
             return replace(done, muted=len(given) - len(paths))
         except BaseException:
             # Ctrl-C arrives here: workers stop at their next wavelength
@@ -191,8 +198,10 @@ def _final(
     meter: _ProgressMeter,
     costs: CostMeter | None = None,
     kept: PartialPicture | None = None,
+    ranking: GhostRanking | None = None,
 ) -> GhostPass:
     others, faintest = levels
+    layers_of, singles = singles, singles if ranking is None else None
     if kept is not None:
         kept.begin(f"order{len(paths[0].mirrors) if paths else 0}", shots, paths, quality, singles, art, levels)
     # separate layers need every ghost
@@ -266,7 +275,9 @@ def _final(
 
     wide = _alike([item for k in order if k not in alone for item in found[k]], seen_level)
     jobs = [partial(draw_spread, number) for number in range(min(len(wide), _MOST_CHUNKS))]
-    total, layers = _collect(shots, order, named, singles, art, draw, pool, jobs, len(shots))
+    total, layers = _collect(
+        shots, order, named, singles, art, draw, pool, jobs, len(shots), layers_of=layers_of, ranking=ranking
+    )
     share = float(flux[~keep].sum() / flux.sum()) if flux.sum() > 0.0 else 0.0
     names = tuple(path.name for path in named)
     culled = int((~keep).sum())
@@ -282,7 +293,9 @@ def _draft(
     art: Mapping[str, PathArt],
     pool: ThreadPoolExecutor,
     meter: _ProgressMeter,
+    ranking: GhostRanking | None = None,
 ) -> GhostPass:
+    layers_of, singles = singles, singles if ranking is None else None
     points, wide = ([s for s in shots if (s.border is None) == point] for point in (True, False))
     order = _rank_draft(shots, paths, art) if singles != 0 and paths else list(range(len(paths)))
     alone = set(order if singles is None else order[:singles])
@@ -340,7 +353,9 @@ def _draft(
         return planes
 
     named = [paths[k] for k in order]
-    total, layers = _collect(shots, order, named, singles, art, draw, pool, most_chunks=_DRAFT_CHUNKS)
+    total, layers = _collect(
+        shots, order, named, singles, art, draw, pool, most_chunks=_DRAFT_CHUNKS, layers_of=layers_of, ranking=ranking
+    )
     return GhostPass(total, layers, len(paths), None, 0, 0.0, 0)
 
 
@@ -510,22 +525,34 @@ def _collect(
     jobs: Sequence[Callable[[], list[Plane | None]]] = (),
     ghosts_each: int = 1,
     most_chunks: int = _MOST_CHUNKS,
+    *,
+    layers_of: int | None,
+    ranking: GhostRanking | None,
 ) -> tuple[Layer, tuple[Layer, ...]]:
     """Draw the first `singles` items separately, the others in a fixed number of groups, then run `jobs`; add in order.
 
-    Each item stands for `ghosts_each` ghosts.
+    Each item stands for `ghosts_each` ghosts. The first `layers_of` separate ones become layers.
     """
     shot = shots[0]
     pixel_area = 1.0 / float(shot.to_pixels[2] * shot.to_pixels[3])
     luminance = luminance_weights(shot.colorspace)
     alone = len(items) if singles is None else min(singles, len(items))
+    kept_layers = alone if layers_of is None else min(layers_of, alone)
     chunks = _chunks(shot, (len(items) - alone) * ghosts_each, most_chunks)
     rest = [items[alone + c :: chunks] for c in range(chunks)]
     totals: list[Plane | None] = [None] * DETAILS
     layers: list[Layer] = []
     spare, held = spare_bytes() if alone else 0.0, 0.0
-    for k, planes in enumerate(pool.map(draw, [[k] for k in items[:alone]])):
+    ahead = max(2, _AHEAD_BYTES // (_CANVAS_BYTES * shot.size_px[0] * shot.size_px[1]))
+    for k, planes in enumerate(_in_turn(pool, draw, [[k] for k in items[:alone]], ahead)):
         path, pixels = named[k], merge(planes, shot.size_px)
+        if ranking is not None:
+            x0, y0, x1, y1 = lit_window(pixels)
+            light = luminance_of(pixels[y0:y1, x0:x1], shot.colorspace) / np.float32(pixel_area)
+            ranking.add(path.name, light, (x0, y0, x1 - x0, y1 - y0))
+        if k >= kept_layers:
+            totals = _added(totals, planes)
+            continue
         about: dict[str, str | float] = {
             "path": path.name,
             # sum down the columns first: along a row the three channels alternate
@@ -545,6 +572,22 @@ def _collect(
         totals = _added(totals, planes)
     total = merge(totals, shot.size_px)
     return to_layer("ghosts", total, pixel_area, {}, reuse=True), tuple(layers)
+
+
+def _in_turn(
+    pool: ThreadPoolExecutor,
+    work: Callable[[list[int]], list[Plane | None]],
+    items: Sequence[list[int]],
+    ahead: int,
+) -> Iterator[list[Plane | None]]:
+    """Work in parallel and return the results in order; at most `ahead` of them are in memory or in the making."""
+    waiting: deque[Future[list[Plane | None]]] = deque()
+    for item in items:
+        if len(waiting) == ahead:
+            yield waiting.popleft().result()
+        waiting.append(pool.submit(work, item))
+    while waiting:
+        yield waiting.popleft().result()
 
 
 def _chunks(shot: Shot, ghosts: int, most_chunks: int) -> int:

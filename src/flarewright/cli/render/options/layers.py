@@ -24,6 +24,14 @@ class LayerOptions:
         int | None,
         typer.Option(help="Largest number of single ghosts to write, brightest first.", rich_help_panel=PANEL),
     ] = None
+    matte: Annotated[
+        str | None,
+        typer.Option(help="ghosts: also a Cryptomatte that picks single ghosts; none: default.", rich_help_panel=PANEL),
+    ] = None
+    matte_ranks: Annotated[
+        int | None,
+        typer.Option(help="Ghosts a pixel in the Cryptomatte, an even number (default: 8).", rich_help_panel=PANEL),
+    ] = None
     no_starburst: Annotated[
         bool, typer.Option("--no-starburst", help="Omit the light's direct image.", rich_help_panel=PANEL)
     ] = False
