@@ -113,12 +113,19 @@ class GhostRanking:
 
 def _insert(held: Pixels, whose: NDArray[np.int32], light: Pixels, objects: NDArray[np.int32]) -> None:
     """Insert an object a pixel into sorted ranks of shape (ranks, h, w), in place, where its light has a rank."""
-    y, x = np.nonzero(light > held[-1])
-    values, names, new = held[:, y, x], whose[:, y, x], light[y, x]
-    place = (values >= new).sum(axis=0)
-    rank = np.arange(len(held))[:, None]
-    held[:, y, x] = np.where(rank < place, values, np.where(rank == place, new, np.roll(values, 1, axis=0)))
-    whose[:, y, x] = np.where(rank < place, names, np.where(rank == place, objects[y, x], np.roll(names, 1, axis=0)))
+    taken = light > held[-1]
+    if not taken.any():
+        return
+    taken[:] = False
+    for row, own in zip(held, whose, strict=True):
+        # what an object displaces displaces the next one, also an equally bright one: the order of equal ones stays
+        taken |= light > row
+        if not taken.any():
+            continue
+        below, under = np.where(taken, row, light), np.where(taken, own, objects)
+        np.copyto(row, light, where=taken)
+        np.copyto(own, objects, where=taken)
+        light, objects = below, under
 
 
 def luminance_of(pixels: Pixels | Floats, colorspace: Colorspace) -> Pixels:
