@@ -359,7 +359,7 @@ COMMAND_LINES = {
         "pixels of 2.78e+04 mm are too coarse for the starburst, whose core has 0.084 mm; give a smaller --sensor"),
     "unknown layers": ([*H, *GOOD, "--layers", "all"], "--layers"),
     "brightest zero": ([*H, *GOOD, "--brightest", "0"], "--brightest"),
-    "unknown colorspace": ([*H, *GOOD, "--colorspace", "aces"], "--colorspace"),
+    "unknown colorspace": ([*H, *GOOD, "--colorspace", "nonsense"], "rec709"),
     "unknown view": ([*H, *GOOD, "--view", "log"], "--view 'log'"),
     "two exposures": ([*H, *GOOD, "--ev", "12", "--shutter", "1/50"], "--ev and --shutter"),
     "iso alone": ([*H, *GOOD, "--iso", "400"], "--iso needs --ev or --shutter"),

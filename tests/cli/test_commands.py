@@ -80,6 +80,7 @@ class FakeRendering:
     remarks: tuple[str, ...] = ("a remark",)
     ledger: None = None
     profile: None = None
+    matte: None = None
 
 
 @pytest.fixture

@@ -163,11 +163,18 @@ def shot(
     >>> moving = Project(lens="heliar-tronnier", lights=[Light(field_deg=(0, 4), keyframes=path)])
     >>> shot(moving, "flare.####.exr", frames="1-25", shutter_deg=180)               # doctest: +SKIP
     """
+    from ..render.image.ocio_space import check_file_space, has_film_primaries
     from .shot_frame import ShotPlan
 
     _check(shutter_deg, subframes)
     if radiance and (plate is not None or project.lit_by_plate):
         raise ProjectError("layers over a plate have its unit already; omit --radiance")
+    of_space = check_file_space(project)
+    if movie is not None and not has_film_primaries(project):
+        raise ProjectError(
+            f"a film is made of frames in Rec.709 or ACEScg, and these are in {project.output.ocio_space}: omit the "
+            "film, or that colour space"
+        )
     processes = workers_of(cluster, processes, threads)
     if plate is not None:
         plate = replace(plate, first=project.timeline.start)
@@ -177,6 +184,7 @@ def shot(
         project = without_found_lights(project)
     pattern = FramePattern(os.fspath(output))
     numbers, remarks = shot_frames(project, frames, plate)
+    remarks += of_space
     pattern.check(numbers)
     _check_output(pattern)
     comp = _comp_pattern(over, plate, project, numbers)

@@ -22,6 +22,7 @@ from ..jobs.frame_list import FramePattern
 from ..jobs.worker import WRITING
 from ..measure.replay.measured_project import is_measured, render_measured
 from ..model import Layer, Project
+from ..render.image.ocio_space import config_digest, in_file_space
 from ..render.render import BLACK, Rendering
 from ..render.render import render as render_project
 from ..render.scene.resolve import open_lens, resolve_project
@@ -244,7 +245,7 @@ def _digest(plan: ShotPlan, frame: int, moments: tuple[Project, ...]) -> str:
         "lens": content,
         "files": {name: digest_of(name) for name in images},
         "frame": [frame, str(frame_rate(timeline.fps)), plan.open_s],
-        "file": [plan.scale, plan.parts, plan.cropped],
+        "file": [plan.scale, plan.parts, plan.cropped, config_digest(moments[0])],
     }
     if plan.plate is not None:
         settings = plan.plate.settings
@@ -329,19 +330,20 @@ def _write(plan: ShotPlan, frame: int, moments: tuple[Project, ...], rendering: 
         from .plates.plate_frame import comp_attributes, write_comp
 
         attributes |= comp_attributes(plan.plate, frame)
-    names = [part_name(layer.name) for layer in rendering.layers]
+    layers, space = in_file_space(rendering.layers, project)
+    names = [part_name(layer.name) for layer in layers]
     if len(set(names)) < len(names):
         raise ProjectError(f"two layers would have one name among {', '.join(names)[:200]}")
     with WRITING:
         write_exr(
             plan.path(frame),
-            [replace(layer, name=name) for layer, name in zip(rendering.layers, names, strict=True)],
+            [replace(layer, name=name) for layer, name in zip(layers, names, strict=True)],
             project.camera.size_px,
             pixel_type=project.output.pixel_type,
             scale=plan.scale,
             metadata=metadata,
             pixel_aspect=project.camera.pixel_aspect,
-            colorspace=project.output.colorspace,
+            colorspace=space,
             full_windows=not plan.cropped,
             one_part=plan.parts == "single",
             compression=project.output.compression,

@@ -43,6 +43,8 @@ def render(options: RenderOptions) -> None:
     Every value is an irradiance on the sensor relative to a light of irradiance 1, so layers add up to the beauty.
     A file of half floats holds the value times a power of two, its attribute flarewright.scale.
     """
+    from ...render.image.ocio_space import check_file_space
+
     check_place(options.output, ".exr")
     view_of = preview_look(
         view=options.view,
@@ -56,6 +58,7 @@ def render(options: RenderOptions) -> None:
     state = _read_state(options.resume)
     flags, settings, remarks = project_of_options(options, state)
     check_exposure(view_of, settings)
+    remarks += check_file_space(settings)
     run = _reference_run(options, settings, state)
     kept = _kept_part(options, settings)
     keep_inputs(
@@ -370,26 +373,28 @@ def _write(
     from ...io.images.half import exr_scale
     from ...io.project.project_file import project_text
     from ...render.image.gamut import negative_share
+    from ...render.image.ocio_space import in_file_space
 
     project = rendering.project
     width, height = project.camera.size_px
     scale = exr_scale(project)
+    layers, space = in_file_space(rendering.layers, project)
     remarks = list(
         write_exr(
             output,
-            rendering.layers,
+            layers,
             (width, height),
             pixel_type=project.output.pixel_type,
             scale=scale,
             metadata={"version": __version__, "project": project_text(project)},
             pixel_aspect=project.camera.pixel_aspect,
-            colorspace=project.output.colorspace,
+            colorspace=space,
             full_windows=full_windows,
             compression=project.output.compression,
             matte=rendering.matte,
         )
     )
-    outside = negative_share(rendering.layers[0])
+    outside = negative_share(layers[0])
     if outside > 0.0:
         remarks.append(
             f"{round(outside * width * height)} of {width * height} pixels have a negative channel: colours outside "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import ValidationError
 
@@ -15,6 +15,7 @@ from ...io.project.camera_list import is_camera_name
 from ...io.project.project_file import ProjectFileError, read_project, validation_messages
 from ...io.project.spectrum_text import parse_spectrum
 from ...model import Art, Holdout, Iris, Lens, Light, Project, ProjectCurve, Scatter
+from ...model.project.camera import Colorspace
 from ...model.project.light import SUN_DEG
 from ..common import field_angles, pair
 from .art_flags import art_flags
@@ -65,6 +66,8 @@ _FLAG_OF = {
     "output.layers": "--layers",
     "output.brightest": "--brightest",
     "output.colorspace": "--colorspace",
+    "output.ocio_space": "--colorspace",
+    "output.ocio_config": "--ocio",
     "output.gamut": "--gamut",
     "output.matte_ranks": "--matte-ranks",
     "output.matte": "--matte",
@@ -125,6 +128,8 @@ def build_project(flags: RenderOptions) -> Project:
         given = {key: value for key, value in changes.items() if value is not None}
         if given:
             fields[section] = {**(dict(getattr(base, section)) if base else {}), **given}
+    if spaces := space_flags(flags, base):
+        fields["output"] = {**dict(fields.get("output") or {}), **spaces}
     if base is not None:
         fields["curves"] = _kept_curves(flags, base)
     scatter = base.scatter if base else None
@@ -135,6 +140,28 @@ def build_project(flags: RenderOptions) -> Project:
     }
     fields |= {section: table for section, table in changed.items() if table is not None}
     return project_of(fields)
+
+
+def space_flags(flags: RenderOptions, base: Project | None) -> dict[str, Any]:
+    """Return the colour space of the flags; empty when none sets it.
+
+    The configuration that the variable OCIO names becomes part of the project: it draws the same file later.
+    """
+    if flags.colorspace in get_args(Colorspace):
+        if flags.ocio is not None:
+            raise ProjectError(f"--ocio has no effect on --colorspace {flags.colorspace}, which is built in; keep one")
+        return {"colorspace": flags.colorspace, "ocio_space": None, "ocio_config": None}
+    space = flags.colorspace or (None if base is None else base.output.ocio_space)
+    if flags.ocio is not None and space is None:
+        raise ProjectError("--ocio is the configuration of a colour space: add --colorspace NAME, or omit it")
+    if flags.colorspace is None and flags.ocio is None:
+        return {}
+    from ...render.image.ocio_space import config_name
+
+    if flags.ocio is not None and not flags.ocio.is_file():
+        raise ProjectError(f"--ocio {flags.ocio} {_no_file(flags.ocio)}; give an OpenColorIO configuration")
+    config = config_name(None if flags.ocio is None else str(flags.ocio.absolute()))
+    return {"colorspace": "rec709", "ocio_space": space, "ocio_config": config}
 
 
 def _kept_curves(flags: RenderOptions, base: Project) -> tuple[ProjectCurve, ...]:
@@ -254,7 +281,6 @@ def _sections(flags: RenderOptions) -> dict[str, dict[str, Any]]:
         "output": {
             "layers": flags.layers,
             "brightest": flags.brightest,
-            "colorspace": flags.colorspace,
             "gamut": flags.gamut,
             "pixel_type": "half" if flags.half else "float" if flags.float32 else None,
             "compression": flags.compression,

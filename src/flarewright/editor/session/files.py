@@ -26,6 +26,7 @@ from ...io.project.look_file import look_text, read_look
 from ...io.project.project_file import project_from_data, project_text, read_project
 from ...measure.replay.measured_project import is_measured, render_any, with_sensor
 from ...model import Camera, Iris, Lens, Light, Look, Project
+from ...render.image.ocio_space import check_file_space, in_file_space
 from ...render.scene.looks import look_of
 from ...render.scene.photographic_defaults import as_photographed
 from ...render.scene.resolve import first_order, open_lens
@@ -295,11 +296,13 @@ def command_line(file: str, project: Project) -> str:
 
 def export_picture(project: Project, path: Path, progress: Progress | None = None) -> None:
     """Render a project at its size and quality into an EXR with layers."""
+    check_file_space(project)
     rendering = render_any(project, progress=progress, limit=True)
+    layers, space = in_file_space(rendering.layers, project)
     write_exr(
-        path, rendering.layers, project.camera.size_px, pixel_type=project.output.pixel_type,
+        path, layers, project.camera.size_px, pixel_type=project.output.pixel_type,
         scale=exr_scale(project), metadata={"version": __version__, "project": project_text(project)},
-        pixel_aspect=rendering.project.camera.pixel_aspect, colorspace=project.output.colorspace,
+        pixel_aspect=rendering.project.camera.pixel_aspect, colorspace=space,
         compression=project.output.compression, matte=rendering.matte,
     )  # fmt: skip
 

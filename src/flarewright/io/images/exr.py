@@ -46,6 +46,7 @@ from ..files.atomic_write import write_atomically
 from ..files.door import outside, printable, sentences_for, shown
 from ..files.silence_libraries import silenced
 from .cryptomatte import matte_attributes, matte_layers, matte_names
+from .file_space import PRIMARIES, FileSpace
 from .half import HALF_MAX, half_scale, rounded_to_half
 
 # (red x, y, green x, y, blue x, y, white x, y): ITU-R BT.709-6 table 3; ACEScg as S-2014-004, AP1 with the ACES white.
@@ -106,7 +107,7 @@ def write_exr(
     scale: float | None = None,
     metadata: Mapping[str, str] | None = None,
     pixel_aspect: float = 1.0,
-    colorspace: Colorspace = "rec709",
+    colorspace: Colorspace | FileSpace = "rec709",
     full_windows: bool = False,
     attributes: Mapping[str, Any] | None = None,
     one_part: bool = False,
@@ -132,8 +133,9 @@ def write_exr(
         Stored in the first part's header, each name prefixed by "flarewright.".
     pixel_aspect : float
         Width of a pixel over its height.
-    colorspace : {"rec709", "acescg"}
-        Primaries of the pixels; the function converts nothing.
+    colorspace : {"rec709", "acescg"} or FileSpace
+        Primaries of the pixels; the function converts nothing. Those of a `FileSpace` are stated where they are known,
+        its name in any case.
     full_windows : bool
         Write single ghosts at the size of the picture as well (for Blender).
     attributes : mapping of str to object, optional
@@ -617,7 +619,7 @@ def _header(
     window: tuple[int, int, int, int],
     size_px: tuple[int, int],
     pixel_aspect: float,
-    colorspace: Colorspace,
+    colorspace: Colorspace | FileSpace,
 ) -> dict[str, Any]:
     import OpenEXR
 
@@ -629,7 +631,16 @@ def _header(
         "displayWindow": ((0, 0), (size_px[0] - 1, size_px[1] - 1)),
         "dataWindow": ((x, y), (x + w - 1, y + h - 1)),
         "pixelAspectRatio": float(pixel_aspect),
-        "chromaticities": CHROMATICITIES[colorspace],
-        "colorInteropID": _INTEROP_ID[colorspace],
+        **_stated(colorspace),
         **about,
     }
+
+
+def _stated(colorspace: Colorspace | FileSpace) -> dict[str, Any]:
+    """Return the attributes of a colour space."""
+    if not isinstance(colorspace, FileSpace):
+        return {"chromaticities": CHROMATICITIES[colorspace], "colorInteropID": _INTEROP_ID[colorspace]}
+    named = {f"{_PREFIX}colorspace": printable(colorspace.name), f"{_PREFIX}ocio": printable(colorspace.config)}
+    if colorspace.known is None:
+        return named
+    return {**named, "chromaticities": PRIMARIES[colorspace.known], "colorInteropID": colorspace.known}

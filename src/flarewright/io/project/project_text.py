@@ -71,6 +71,8 @@ ABOUT = {
     "output.layers": '"beauty", "passes" or "ghosts" (one layer a ghost)',
     "output.brightest": "20   # number of single ghosts",
     "output.colorspace": '"rec709" or "acescg", linear',
+    "output.ocio_space": '"scene_linear"   # of the file: a name, role or alias of an OpenColorIO configuration',
+    "output.ocio_config": '"show.ocio"   # its configuration; default: that of the variable OCIO, else "ocio://default"',
     "output.gamut": '"keep" negative channels, or "compress" colours to avoid them',
     "output.matte": '"ghosts": a Cryptomatte of the ghosts\' shares of the light, or "none"',
     "output.matte_ranks": "ghosts that it keeps at a pixel, an even number",

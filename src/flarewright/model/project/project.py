@@ -139,6 +139,11 @@ class Output(Frozen):
     brightest : int or None
         Only the N brightest single ghosts get a separate layer.
     colorspace : {"rec709", "acescg"}
+    ocio_space : str or None
+        A linear colour space of scenes, a role or an alias of an OpenColorIO configuration: the pixels of files are
+        converted to it from rec709.
+    ocio_config : str or None
+        Its configuration, a file or a name such as "ocio://default"; None: the variable OCIO, else the built-in one.
     gamut : {"keep", "compress"}
         keep: colours outside the primaries have negative channels; compress: colours are moved towards white, and the
         beauty is the sum of the compressed passes.
@@ -158,6 +163,8 @@ class Output(Frozen):
     layers: Literal["beauty", "passes", "ghosts"] = "passes"
     brightest: int | None = Field(None, ge=1)
     colorspace: Colorspace = "rec709"
+    ocio_space: str | None = Field(None, min_length=1)
+    ocio_config: str | None = Field(None, min_length=1)
     gamut: Literal["keep", "compress"] = "keep"
     pixel_type: Literal["half", "float"] = "half"
     compression: Literal["zip", "dwaa"] = "zip"
@@ -171,6 +178,12 @@ class Output(Frozen):
         if ranks % 2:
             raise ValueError(f"a layer of a Cryptomatte has two ranks; give an even number, such as {ranks + 1}")
         return ranks
+
+    @model_validator(mode="after")
+    def _one_space(self) -> Output:
+        if self.ocio_space is not None and self.colorspace != "rec709":
+            raise ValueError(f'ocio_space is converted from "rec709", and colorspace is "{self.colorspace}": keep one')
+        return self
 
     @model_validator(mode="after")
     def _dwaa_keeps_16_bits(self) -> Output:

@@ -36,7 +36,15 @@ _OKLAB_AXES = np.array([
     [0.0259040371, 0.7827717662, -0.8086757660],
 ])  # fmt: skip
 
-__all__ = ["ACES_WHITE", "D65_WHITE", "brightest_channel", "luminance_weights", "oklab", "xyz_to_rgb_matrix"]
+__all__ = [
+    "ACES_WHITE",
+    "D65_WHITE",
+    "adapted_to_rgb_matrix",
+    "brightest_channel",
+    "luminance_weights",
+    "oklab",
+    "xyz_to_rgb_matrix",
+]
 
 
 @lru_cache
@@ -64,9 +72,31 @@ def xyz_to_rgb_matrix(colorspace: Colorspace) -> Floats:
     """
     if colorspace not in _PRIMARIES:
         raise ValueError(f"colour space {colorspace!r} is unknown; use one of {', '.join(_PRIMARIES)}")
-    white = D65_WHITE if colorspace == "rec709" else ACES_WHITE
-    matrix = np.linalg.inv(_rgb_to_xyz(_PRIMARIES[colorspace], white)) @ _bradford(D65_WHITE, white)
+    matrix = adapted_to_rgb_matrix(_PRIMARIES[colorspace], D65_WHITE if colorspace == "rec709" else ACES_WHITE)
     matrix.flags.writeable = False
+    return matrix
+
+
+def adapted_to_rgb_matrix(
+    primaries: tuple[tuple[float, float], tuple[float, float], tuple[float, float]], white: tuple[float, float]
+) -> Floats:
+    """Return the matrix from XYZ (D65 white, Y = 1) to linear RGB of primaries and a white, adapted to that white.
+
+    Parameters
+    ----------
+    primaries : tuple of (x, y)
+        Chromaticities of red, green and blue.
+    white : tuple of float
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+
+    Notes
+    -----
+    As `xyz_to_rgb_matrix`.
+    """
+    matrix: Floats = np.linalg.inv(_rgb_to_xyz(primaries, white)) @ _bradford(D65_WHITE, white)
     return matrix
 
 

@@ -11,5 +11,6 @@ Modules:
 - `photographic_exposure`: `photographic_stops`: exposure from shutter, f-number and ISO
 - `display`: `view`, `auto_exposure`: from linear light to 8-bit sRGB
 - `aces_view`: `aces_pixels`: the ACES view through opencolorio
+- `ocio_space`: `check_file_space`, `in_file_space`: colour spaces of OpenColorIO for files
 - `cache`: `Kept` (a cache by key) and `BufferPool` (arrays joined in one block)
 """

@@ -77,6 +77,11 @@ def film_look(
         plate, so that the plate looks as before; other pictures are srgb; both with an exposure of 0.
     """
     contents = _ours(files[0])
+    if contents is not None and "colorspace" in contents.metadata and first.colorspace is None:
+        raise ProjectError(
+            f"the frames are in {contents.metadata['colorspace']}, and a film is made of frames in Rec.709 or ACEScg: "
+            "draw them with --colorspace rec709"
+        )
     space = first.colorspace or "rec709"
     if contents is None or "plate" in contents.metadata or "project" not in contents.metadata:
         plate = None if contents is None else _plate_transfer(contents)

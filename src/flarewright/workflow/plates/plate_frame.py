@@ -15,6 +15,7 @@ from ...plates.comp import composed, source_mask
 from ...plates.field_map import FieldMap, field_map
 from ...plates.lights import lights_at, plate_factor
 from ...plates.measured_plate import converted, measured_pixels
+from ...render.image.ocio_space import in_file_space
 from ...render.scene.pixel_place import DirectImages, direct_images
 from ...render.scene.resolve import resolve_project
 from .plate_files import plate_matte, plate_picture
@@ -233,17 +234,18 @@ def write_comp(
     settings = plate.settings
     too_dark = picture.white is not None or settings.gain > 1.0 or settings.source is not None
     whole = composed(converted(picture, project.output.colorspace), passes, mask, too_dark=too_dark)
+    shown, space = in_file_space([whole], project)
     # a film of the comp has the curve of its plate
     facts = {"threshold": plate.threshold, "gain": settings.gain, "transfer": picture.transfer}
     write_exr(
         path,
-        [whole],
+        shown,
         plate.size_px,
         pixel_type=project.output.pixel_type,
         scale=1.0,
         metadata={**metadata, "plate": json.dumps(facts)},
         pixel_aspect=project.camera.pixel_aspect,
-        colorspace=project.output.colorspace,
+        colorspace=space,
         compression=project.output.compression,
         attributes={**attributes, **(picture.header or {})},
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -36,8 +37,19 @@ class LayerOptions:
         bool, typer.Option("--no-starburst", help="Omit the light's direct image.", rich_help_panel=PANEL)
     ] = False
     colorspace: Annotated[
-        str | None, typer.Option(help="Colour space, linear: rec709 or acescg.", rich_help_panel=PANEL)
-    ] = None
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Linear colour space: rec709 (default), acescg, or a name or role of OpenColorIO.",
+            rich_help_panel=PANEL,
+        ),
+    ] = None  # fmt: skip
+    ocio: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="OpenColorIO configuration of --colorspace (default: OCIO, or the built-in one).",
+            rich_help_panel=PANEL,
+        ),
+    ] = None  # fmt: skip
     gamut: Annotated[
         str | None,
         typer.Option(help="keep negative channels (default), or compress colours.", rich_help_panel=PANEL),
