@@ -30,7 +30,7 @@ from ...optics.rays.torn_cells import cut_failed_triangles
 from ...typing import Floats, Mask
 from ..image.canvas import blank
 from ..scene.path_color import RayFilter, visible_rays
-from ..scene.shot import Shot
+from ..scene.shot import Shot, seen_light
 
 # lowest expected colour error for a correction, relative to the ghost's largest channel
 COLOR_ERROR, DRAFT_COLOR_ERROR = 0.009, 0.0077
@@ -65,7 +65,6 @@ __all__ = [
     "gaps_at_ends",
     "light_up_to_its_end",
     "over",
-    "seen_light",
     "steep_gaps",
     "steep_paths",
     "steepness",
@@ -404,14 +403,3 @@ def _trapezoids(values: Floats, places: Floats) -> float:
 def over(values: Floats, carried: Floats) -> Floats:
     """Divide by the weight of rays; 0 where it is 0."""
     return np.divide(values, carried, out=np.zeros_like(values), where=carried > 0.0)
-
-
-def seen_light(shot: Shot) -> Floats:
-    """Return the weights of a shot's light in the channels, shape (L, 3), at `CURVE_NM`."""
-    return _seen_light(shot.light.spectrum, shot.colorspace)
-
-
-@lru_cache(maxsize=64)
-def _seen_light(spectrum: Spectrum, colorspace: Colorspace) -> Floats:
-    parts: Floats = band_parts(spectrum, CURVE_NM[len(CURVE_NM) // 2], colorspace, CURVE_NM)[:, 0]
-    return parts

@@ -15,10 +15,11 @@ from ...optics.lens.paths import LightPath, direct_path
 from ...optics.rays.bundle import Bundle
 from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum, path_spectra, step_squares
 from ...typing import Floats, Mask
-from .shot import Shot
+from .shot import Shot, seen_light
 
-# number of rays of a bundle that represent its angles of incidence, at all wavelengths together
-RAYS = 64
+# number of rays of a bundle that represent its angles of incidence, at all wavelengths together, and where one half of
+# them gives colours that differ by more than a part of the largest channel from the other half's
+RAYS, MORE_RAYS, SAMPLE_ERROR = 64, 256, 0.04
 # part of the light below which a wavelength has no rays
 LEAST_SHARE = 0.02
 # number of triangles of the grid among which they are chosen
@@ -57,27 +58,47 @@ def traced_spectrum(shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floa
     """
     if shot.curves is None:
         return None
-    found_nm, spectra = [], []
-    for wave, rays in _representative_rays(shot, bundle, to_pixels):
+    # films that reflect almost nothing of a light at some angles need more rays
+    for rays in (RAYS, MORE_RAYS):
+        found = _sampled_spectrum(shot, path, bundle, to_pixels, rays)
+        if found is None or found[1] <= SAMPLE_ERROR:
+            break
+    return None if found is None else found[0]
+
+
+def _sampled_spectrum(
+    shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floats, count: int
+) -> tuple[PathSpectrum, float] | None:
+    """Return a path's spectrum by some rays, and how much the colours of every other ray differ from the rest's."""
+    assert shot.curves is not None
+    found_nm, passed, carried = [], [], []
+    for wave, rays in _representative_rays(shot, bundle, to_pixels, count):
         squares = step_squares(shot.packed, path, shot.incidence.tilt, bundle.pupil[rays], wave)
-        if len(squares) > 0:
-            found_nm.append(shot.packed.wavelengths_nm[wave])
-            spectra.append(path_spectra(shot.curves, [path], squares).of(0))
-    if len(spectra) < 2:
-        return spectra[0] if spectra else None
+        if len(squares) == 0:
+            continue
+        # rays are in the order of the pupil's area, so both halves of them cover it
+        even = len(squares) // 2 * 2
+        halves = [squares[:even:2], squares[1:even:2]] if even else [squares, squares]
+        both = path_spectra(shot.curves, [path, path], np.concatenate(halves, axis=1))
+        found_nm.append(shot.packed.wavelengths_nm[wave])
+        passed.append(both.passed)
+        carried.append(both.carried.mean(axis=0))
+    if not found_nm:
+        return None
     # other rays of a ghost land in the picture at other wavelengths, at other angles
-    passed, carried = (
-        np.einsum("wl,wl->l", hats(nm, found_nm), np.stack(curves))
-        for nm, curves in (
-            (CURVE_NM, [one.passed for one in spectra]),
-            (shot.packed.wavelengths_nm, [one.carried for one in spectra]),
-        )
+    curves = np.einsum("wl,whl->hl", hats(CURVE_NM, found_nm), np.stack(passed))
+    spectrum = PathSpectrum(
+        curves.mean(axis=0), np.einsum("wl,wl->l", hats(shot.packed.wavelengths_nm, found_nm), np.stack(carried))
     )
-    return PathSpectrum(passed, carried)
+    # not `@`, whose library threads busy-wait next to ours
+    difference, color = np.einsum("kl,lc->kc", np.stack([curves[0] - curves[1], spectrum.passed]), seen_light(shot))
+    return spectrum, float(np.abs(difference).max() / max(np.abs(color).max(), np.finfo(np.float64).tiny))
 
 
-def _representative_rays(shot: Shot, bundle: Bundle, to_pixels: Floats) -> list[tuple[int, NDArray[np.intp]]]:
-    """Choose rays that represent a ghost's light: visible ones, else passing ones, else any that reach the iris.
+def _representative_rays(
+    shot: Shot, bundle: Bundle, to_pixels: Floats, count: int
+) -> list[tuple[int, NDArray[np.intp]]]:
+    """Choose `count` rays or a few more of a ghost: visible ones, else passing ones, else any that reach the iris.
 
     Returns
     -------
@@ -87,7 +108,7 @@ def _representative_rays(shot: Shot, bundle: Bundle, to_pixels: Floats) -> list[
     waves = sorted(bundle.traced)
     light = np.abs(shot.weights(shot.packed.wavelengths_nm[waves])).sum(axis=1)
     shares = light / max(light.sum(), np.finfo(np.float64).tiny)
-    counts = np.where(shares < LEAST_SHARE, 0, np.ceil(RAYS * shares)).astype(np.int64)
+    counts = np.where(shares < LEAST_SHARE, 0, 2 * np.ceil(0.5 * count * shares)).astype(np.int64)
     anywhere = np.zeros((2, 3)), (np.inf, np.inf)
     looks = (
         visible_rays(shot, to_pixels, bundle.halves),
@@ -100,7 +121,7 @@ def _representative_rays(shot: Shot, bundle: Bundle, to_pixels: Floats) -> list[
             return found
         # a sliver can pass at one end of the spectrum only, where the light is faint
         for w in (w for w, n in zip(waves, counts, strict=True) if n == 0):
-            rays, _ = spread_rays(bundle, (w,), seen, RAYS)
+            rays, _ = spread_rays(bundle, (w,), seen, count)
             if rays.size > 0:
                 return [(w, rays)]
     return []

@@ -135,6 +135,12 @@ def carried_at(shot: Shot, spectrum: PathSpectrum, wavelengths_nm: Floats) -> Fl
     return carried
 
 
+def seen_light(shot: Shot) -> Floats:
+    """Return the weights of a shot's light in the channels, shape (L, 3), at `CURVE_NM`."""
+    one_nm = float(CURVE_NM[len(CURVE_NM) // 2])
+    return _parts(shot.light.spectrum, (one_nm,), shot.colorspace)[:, 0]
+
+
 def moved(shot: Shot, slope: Floats) -> Shot:
     """Return a shot with its light in another direction.
 
