@@ -22,7 +22,13 @@ def projects(monkeypatch, tmp_path):
         width, height = project.camera.size_px
         layer = Layer("beauty", np.zeros((height, width, 3), np.float32), (0, 0, width, height))
         return SimpleNamespace(
-            project=project, layers=(layer,), summary={"f_number": 4.0}, remarks=(), ledger=None, profile=None
+            project=project,
+            layers=(layer,),
+            summary={"f_number": 4.0},
+            remarks=(),
+            ledger=None,
+            profile=None,
+            matte=None,
         )
 
     monkeypatch.setattr("flarewright.render.warmup.compile_for_render", lambda *_: None)

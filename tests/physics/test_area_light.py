@@ -245,6 +245,7 @@ def test_the_same_pixels_whatever_the_threads():
     ("how", "words"),
     [
         ({"field": (80.0, 0.0), "diameter_deg": 30.0}, "beside or behind the camera"),
+        ({"shape": Polygon(corners_deg=((0, 0), (1, 0), (0, 1e308)))}, "beside or behind the camera"),
         ({"shape": Polygon(corners_deg=((0, 0), (1, 1), (2, 2)))}, "has no area"),
         ({"shape": Polygon(corners_deg=((0, 0), (4, 0), (0, 3), (3, 3)))}, "edges that cross each other"),
         ({"shape": Rectangle(size_deg=(120.0, 10.0)), "field": (60.0, 0.0)}, "beside or behind the camera"),

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import ProjectError
 from ...model import Light
-from ...model.project.light import LEAST_LIGHT_DEG, Rectangle
+from ...model.project.light import LEAST_LIGHT_DEG, Polygon, Rectangle
 from ...typing import Floats
 from .polygon import centroid, closed, content, solid_angle
 
@@ -72,15 +72,16 @@ def light_outline(light: Light) -> Floats | None:
             offsets = square @ np.array([[cos(turn), sin(turn)], [-sin(turn), cos(turn)]])
         else:
             offsets = np.array(light.shape.corners_deg)
-            least = max(1e-9 * float(np.ptp(offsets, axis=0).max()) ** 2, LEAST_LIGHT_DEG**2)
-            if abs(content(closed(offsets))) < least:
-                raise ProjectError(f"the light {light.name!r} has no area; give corners that enclose an area")
         angles = np.array(light.field_deg) + offsets
+        # first, because areas of corners without a bound overflow
         if np.abs(angles).max() > WIDEST_DEG:
             raise ProjectError(
                 f"the light {light.name!r} reaches beside or behind the camera; its corners must stay within "
                 f"{WIDEST_DEG:g} degrees"
             )
+        least = max(1e-9 * float(np.ptp(offsets, axis=0).max()) ** 2, LEAST_LIGHT_DEG**2)
+        if isinstance(light.shape, Polygon) and abs(content(closed(offsets))) < least:
+            raise ProjectError(f"the light {light.name!r} has no area; give corners that enclose an area")
         corners = np.tan(np.radians(angles))
         if _crosses_itself(corners):
             raise ProjectError(

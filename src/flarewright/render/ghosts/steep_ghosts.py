@@ -20,9 +20,6 @@ from numpy.typing import NDArray
 from ...kernels.raster.bundle import draw_bundle, node_densities
 from ...kernels.tracing.representative_rays import passing_area
 from ...kernels.tracing.sequential import ALIVE, WEIGHT
-from ...model.project.camera import Colorspace
-from ...model.project.light import Spectrum
-from ...optics.colour.spectrum import band_parts
 from ...optics.rays.bundle import Bundle, trace_bundle
 from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum
 from ...optics.rays.steepness import bright_wavelengths, gap_errors, interpolation_error, throughput_ratios
