@@ -19,7 +19,7 @@ from .shot import Shot, seen_light
 
 # number of rays of a bundle that represent its angles of incidence, at all wavelengths together, and where one half of
 # them gives colours that differ by more than a part of the largest channel from the other half's
-RAYS, MORE_RAYS, SAMPLE_ERROR = 64, 256, 0.04
+RAYS, MORE_RAYS, SAMPLE_ERROR = 64, 256, 0.02
 # part of the light below which a wavelength has no rays
 LEAST_SHARE = 0.02
 # number of triangles of the grid among which they are chosen
