@@ -9,7 +9,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -306,6 +306,28 @@ def test_what_stops_a_render_is_one_sentence_and_leaves_nothing(capsys, monkeypa
         assert len(said.err.splitlines()) == 1
         assert said.err.startswith(words)
     assert list(folder.iterdir()) == []
+
+
+def test_a_call_that_fails_without_a_reason_lacks_memory_only_where_none_is_left(capsys, monkeypatch, folder):
+    """The interpreter's own word for a call from C that failed without setting an error."""
+    resource = pytest.importorskip("resource", reason="limits of a process need a POSIX system")
+    old = resource.getrlimit(resource.RLIMIT_AS)
+
+    def stop(*args, limited, **kwargs):
+        if limited:
+            resource.setrlimit(resource.RLIMIT_AS, (1, old[1]))
+        raise SystemError("error return without exception set")
+
+    words = ["render", "heliar-tronnier", "--light", "1,1", "-o", "a.exr"]
+    monkeypatch.setattr("flarewright.render.render.render", partial(stop, limited=False))
+    with pytest.raises(SystemError, match="without exception"):
+        run(words)
+    monkeypatch.setattr("flarewright.render.render.render", partial(stop, limited=True))
+    try:
+        said = call(capsys, *words, code=2)
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, old)
+    assert said.err.startswith("flarewright: error: there is not enough memory")
 
 
 def test_an_unexpected_end_of_a_file_is_no_interruption(monkeypatch):

@@ -56,6 +56,8 @@ from .render import sources_command as sources
 _TYPES = {"is not a valid float": "is no number", "is not a valid integer": "is no whole number"}
 # what the loader of libraries and the interpreter report if there is no memory for a library or for a thread's stack
 _NO_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread")
+# memory that a process can always have unless it is at its limit
+_SPARE_BYTES = 64_000_000
 # largest number of errors of a file that are listed
 _REPORTED = 20
 
@@ -279,6 +281,9 @@ def _call(words: list[str]) -> int:
             return _fail(_usage(error))
         if isinstance(error, ImportError | RuntimeError) and _lacks_memory(error):
             return _fail(_no_memory(words))
+        # the interpreter's own word for a call from C that failed without a reason
+        if isinstance(error, SystemError) and _memory_is_used_up():
+            return _fail(_no_memory(words))
         if not swallowed:
             raise
         code = 130
@@ -323,6 +328,15 @@ def _lacks_memory(error: BaseException | None) -> bool:
         if any(sign in str(error).lower() for sign in _NO_MEMORY):
             return True
         error = error.__cause__ or error.__context__
+    return False
+
+
+def _memory_is_used_up() -> bool:
+    """Return whether this process gets no more memory than what the start of a command needs."""
+    try:
+        bytearray(_SPARE_BYTES)
+    except MemoryError:
+        return True
     return False
 
 
