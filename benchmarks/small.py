@@ -2,11 +2,15 @@
 
     python -m benchmarks --only small [--worst 1.5]
     python -m benchmarks.small
+    python -m benchmarks.small --middle
 
-The second command measures the ratios and keeps them. The works run in turns with the yardstick, and the least
-processor time of each counts, so that other load on the machine matters little. Processors differ in what they do well:
-the ratios of one machine are those of another times a common factor, the median over all works. A work has lost speed
-if it exceeds that factor by much; all of them have if the factor itself is large.
+The second command measures the ratios and keeps them; the third keeps the geometric middle of the kept ones and of
+this machine's, because works that wait for memory cost up to 1.4 times as much on some machines, beside the others.
+
+The works run in turns with the yardstick, and the least processor time of each counts, so that other load on the
+machine matters little. Processors differ in what they do well: the ratios of one machine are those of another times a
+common factor, the median over all works. A work has lost speed if it exceeds that factor by much; all of them have if
+the factor itself is large.
 
 A process may be unlucky for its whole life, with the places of its memory for instance. So a loss is measured again, in
 new processes, and counts if every one of them shows it.
@@ -21,6 +25,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
+from math import sqrt
 from pathlib import Path
 from typing import Any
 
@@ -197,6 +202,19 @@ def surely_lost(
     return list(found.values())
 
 
+def middle(now: Mapping[str, float], kept: Mapping[str, float]) -> dict[str, float]:
+    """Return the geometric middle of two machines' ratios, but for their common factor; works of one alone as they are.
+
+    Parameters
+    ----------
+    now, kept : mapping of str to float
+        Ratio to the yardstick, by work.
+    """
+    changes = {name: ratio / kept[name] for name, ratio in now.items() if name in kept}
+    common = statistics.median(changes.values())
+    return {name: kept[name] * sqrt(changes[name] / common) if name in kept else ratio for name, ratio in now.items()}
+
+
 def elsewhere() -> dict[str, float]:
     """Return the ratios as a new process measures them."""
     done = subprocess.run(
@@ -207,11 +225,14 @@ def elsewhere() -> dict[str, float]:
 
 
 def main() -> None:
-    """Measure the ratios and keep them, or print them for `elsewhere`."""
+    """Measure the ratios and keep them or their middle with the kept ones, or print them for `elsewhere`."""
     if sys.argv[1:] == ["--print"]:
         print(json.dumps({name: ratio for name, (_, ratio) in ratios(LEAST_TURNS).items()}))
         return
-    found = {name: float(f"{ratio:.3g}") for name, (_, ratio) in ratios(15).items()}
+    now = {name: ratio for name, (_, ratio) in ratios(15).items()}
+    if sys.argv[1:] == ["--middle"]:
+        now = middle(now, json.loads(RATIOS.read_text(encoding="utf-8"))["ratios"])
+    found = {name: float(f"{ratio:.3g}") for name, ratio in now.items()}
     RATIOS.write_text(json.dumps({"ratios": found}, indent=2) + "\n", encoding="utf-8")
     print(f"wrote {RATIOS}")
 

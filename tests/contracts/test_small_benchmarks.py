@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from benchmarks.small import MACHINES_DIFFER, PROCESSES, RATIOS, lost, surely_lost, works
+from benchmarks.small import MACHINES_DIFFER, PROCESSES, RATIOS, lost, middle, surely_lost, works
 from benchmarks.yardstick import RAY_SURFACES, trace_plainly
 
 KEPT = {"trace": 2.0, "fill": 10.0, "rings": 0.5}
@@ -43,6 +43,15 @@ def test_a_loss_that_a_process_does_not_show_is_none(unlucky: int) -> None:
 
 def test_without_a_loss_nothing_is_measured_again() -> None:
     assert surely_lost(KEPT, KEPT, 1.5, lambda: pytest.fail("measured again")) == []
+
+
+@pytest.mark.parametrize("common", [0.7, 1.0, 1.6])
+def test_the_middle_of_two_machines_is_as_far_from_both(common: float) -> None:
+    other = {name: common * ratio for name, ratio in KEPT.items()}
+    assert middle(other, KEPT) == pytest.approx(KEPT)
+    between = middle({**other, "fill": 1.44 * other["fill"]}, KEPT)
+    assert between == pytest.approx({**KEPT, "fill": 1.2 * KEPT["fill"]})
+    assert middle({**other, "new": 3.0}, KEPT)["new"] == 3.0
 
 
 def test_a_loss_of_all_works_is_told() -> None:
