@@ -101,9 +101,12 @@ def refused_at_exit(error: BaseException) -> bool:
     The end of the main thread first closes all pools, then waits for their workers, and only then stops daemon threads.
     In between, a job that submits work to a pool gets a RuntimeError. Nothing public reports that state, so the words
     of the message decide ("cannot schedule new futures after interpreter shutdown", "can't create new thread at
-    interpreter shutdown").
+    interpreter shutdown"). A worker that ends closes its pool, whose message then ends like that of any closed pool.
     """
-    return isinstance(error, RuntimeError) and str(error).endswith("interpreter shutdown")
+    if not isinstance(error, RuntimeError):
+        return False
+    ends = bool(getattr(threading, "_SHUTTING_DOWN", False))
+    return str(error).endswith("interpreter shutdown") or (ends and str(error).endswith("after shutdown"))
 
 
 def _lower_priority() -> None:
