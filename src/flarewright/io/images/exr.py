@@ -49,14 +49,9 @@ from .cryptomatte import matte_attributes, matte_layers, matte_names
 from .file_space import PRIMARIES, FileSpace
 from .half import HALF_MAX, half_scale, rounded_to_half
 
-# (red x, y, green x, y, blue x, y, white x, y): ITU-R BT.709-6 table 3; ACEScg as S-2014-004, AP1 with the ACES white.
-CHROMATICITIES: Mapping[Colorspace, tuple[float, ...]] = {
-    "rec709": (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290),
-    "acescg": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
-}
-
-# Names of the ASWF Color Interop Forum for the same two spaces.
+# the built-in spaces by their names of the ASWF Color Interop Forum
 _INTEROP_ID: Mapping[Colorspace, str] = {"rec709": "lin_rec709_scene", "acescg": "lin_ap1_scene"}
+CHROMATICITIES: Mapping[Colorspace, tuple[float, ...]] = {space: PRIMARIES[name] for space, name in _INTEROP_ID.items()}
 
 _PREFIX = "flarewright."
 _SCALE = f"{_PREFIX}scale"

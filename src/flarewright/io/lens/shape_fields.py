@@ -58,20 +58,16 @@ def read_shape(entry: dict[str, Any], where: str, folder: Path | None, problems:
     values: dict[str, Any] = {}
     if "conic_x" in entry and (number := _number(entry["conic_x"], f"{where}: conic_x", CONIC_X, problems)) is not None:
         values["conic_x"] = number
-    if "asphere" in entry:
-        terms = _numbers(entry["asphere"], f"{where}: asphere", TERM, problems)
-        if terms is not None and not 1 <= len(terms) <= MOST_TERMS:
-            problems.append(f"{where}: asphere has {len(terms)} terms: give 1 to {MOST_TERMS}, A4 first, A6 next, ...")
-        elif terms is not None:
-            values["asphere"] = terms
-    if "odd_asphere" in entry:
-        terms = _numbers(entry["odd_asphere"], f"{where}: odd_asphere", TERM, problems)
+    for key, first, second in (("asphere", "A4", "A6"), ("odd_asphere", "A3", "A5")):
+        if key not in entry:
+            continue
+        terms = _numbers(entry[key], f"{where}: {key}", TERM, problems)
         if terms is not None and not 1 <= len(terms) <= MOST_TERMS:
             problems.append(
-                f"{where}: odd_asphere has {len(terms)} terms: give 1 to {MOST_TERMS}, A3 first, A5 next, ..."
+                f"{where}: {key} has {len(terms)} terms: give 1 to {MOST_TERMS}, {first} first, {second} next, ..."
             )
         elif terms is not None:
-            values["odd_asphere"] = terms
+            values[key] = terms
     values |= _moved(entry, where, problems)
     if "figure" in entry:
         values["figure"] = _figure(entry["figure"], f"{where}: figure", folder, problems)
@@ -249,23 +245,12 @@ def shape_parts(row: Surface, number: Any, quoted: Any, radius: Any) -> list[str
 def shape_schema() -> dict[str, Any]:
     """Return the JSON Schema of a row's shape keys except `radius_x`."""
     pair = {"type": "array", "minItems": 2, "maxItems": 2}
+    terms = {"type": "array", "minItems": 1, "maxItems": MOST_TERMS, "items": TERM.schema()}
     return {
         "curvature_x": CURVATURE.schema(),
         "conic_x": CONIC_X.schema(),
-        "asphere": {
-            "type": "array",
-            "minItems": 1,
-            "maxItems": MOST_TERMS,
-            "items": TERM.schema(),
-            "description": "A4, A6, ... of the sag's even terms, 1/mm^3, 1/mm^5, ...",
-        },
-        "odd_asphere": {
-            "type": "array",
-            "minItems": 1,
-            "maxItems": MOST_TERMS,
-            "items": TERM.schema(),
-            "description": "A3, A5, ... of the sag's odd terms, 1/mm^2, 1/mm^4, ...",
-        },
+        "asphere": {**terms, "description": "A4, A6, ... of the sag's even terms, 1/mm^3, 1/mm^5, ..."},
+        "odd_asphere": {**terms, "description": "A3, A5, ... of the sag's odd terms, 1/mm^2, 1/mm^4, ..."},
         "decentre": {**pair, "items": OFFSET.schema(), "description": "x and y offset of the vertex from the axis, mm"},
         "tilt_deg": {**pair, "items": TILT.schema(), "description": "rotation about x, then about y, at the vertex"},
         "figure": {
