@@ -34,8 +34,6 @@ _MOST_REMARKS = 20
 _PROCESS_BYTES, _PIXEL_BYTES = 300_000_000, 240
 # memory of a pixel of a single ghost's layer, and the number of ghosts of a zoom: all are written if none are chosen
 _LAYER_BYTES, _MOST_LAYERS = 24, 200
-# memory of a rank of a pixel of a matte: the object and its light
-_RANK_BYTES = 8
 
 
 @dataclass(frozen=True)
@@ -474,6 +472,8 @@ def _process_bytes(plan: ShotPlan) -> int:
         # a blurred frame averages all ghosts before it chooses the brightest
         chosen = project.output.brightest if plan.shutter_deg == 0.0 else None
         layers = _MOST_LAYERS if chosen is None else chosen
+    from ..render.image.ghost_ranking import RANK_BYTES
+
     # the ranks of a frame, those of a sub-frame's mean, and their layers
     ranks = 4 * project.output.matte_ranks if project.output.matte == "ghosts" else 0
-    return _PROCESS_BYTES + width * height * (_PIXEL_BYTES + layers * _LAYER_BYTES + ranks * _RANK_BYTES)
+    return _PROCESS_BYTES + width * height * (_PIXEL_BYTES + layers * _LAYER_BYTES + ranks * RANK_BYTES)

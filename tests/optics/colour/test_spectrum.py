@@ -14,7 +14,6 @@ from flarewright.optics.colour.spectrum import (
     band_weights,
     cie_1931,
     cubics,
-    mean_wavelength,
     planck,
     spectral_power,
     spectrum_xyz,
@@ -169,12 +168,3 @@ def test_cubics_reproduce_cubic_curves_and_are_constant_beyond():
     assert cubics(np.array([1.25]), [1.0, 2.0]).ravel().tolist() == [0.75, 0.25]
     with pytest.raises(ValueError, match="rise"):
         cubics(places, nodes[::-1])
-
-
-def test_the_mean_wavelength_is_that_of_the_light_that_is_seen():
-    """The end of the spectrum does not count; two lines count by their X + Y + Z."""
-    assert mean_wavelength(Lines(lines=((500.0, 1.0), (830.0, 5.0)))) == pytest.approx(500.0, abs=0.1)
-    short, long = cie_1931(np.array([450.0, 600.0])).sum(axis=1)
-    expected = (450.0 * short + 3.0 * 600.0 * long) / (short + 3.0 * long)
-    assert mean_wavelength(Lines(lines=((450.0, 1.0), (600.0, 3.0)))) == pytest.approx(expected)
-    assert mean_wavelength(BlackBody(temperature_k=2000.0)) > mean_wavelength(BlackBody(temperature_k=9000.0)) + 50.0

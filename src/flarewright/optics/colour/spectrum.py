@@ -32,7 +32,6 @@ __all__ = [
     "cubics",
     "hats",
     "luminance_shares",
-    "mean_wavelength",
     "planck",
     "sampled_wavelengths",
     "spectral_power",
@@ -216,32 +215,6 @@ def luminance_shares(spectrum: Spectrum) -> tuple[Floats, Floats]:
     """
     wave, xyz = _stimulus(spectrum)
     return wave, xyz[:, 1]
-
-
-@lru_cache(maxsize=64)
-def mean_wavelength(spectrum: Spectrum) -> float:
-    """Return the mean wavelength of a light, weighted by its X + Y + Z, nm.
-
-    Parameters
-    ----------
-    spectrum : Spectrum
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    FlarewrightError
-        When the spectrum holds no visible light.
-
-    Examples
-    --------
-    >>> mean_wavelength(Lines(lines=((500.0, 1.0),)))
-    500.0
-    """
-    wave, xyz = _stimulus(spectrum)
-    return float(np.average(wave, weights=xyz.sum(axis=1)))
 
 
 def band_weights(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colorspace) -> Floats:
