@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from flarewright import __version__
 from flarewright.cli.app import run
 from flarewright.cli.common import checkpoints, end_as_interrupted, stop_on_interrupt
 from flarewright.design.results import report
@@ -245,6 +246,9 @@ def rounds(monkeypatch):
         return ended
 
     monkeypatch.setattr(pool_search, "_without_stale_runs", after_round)
+    # short rounds, and proposals from pools soon
+    monkeypatch.setattr(pool_search, "batch_size", lambda _: 4)
+    monkeypatch.setattr(pool_search, "FIRST", 8)
     return planned
 
 
@@ -254,7 +258,7 @@ def made(folder):
     return lenses, json.loads((folder / "search.json").read_text()) | {"seconds": 0, "digest": ""}
 
 
-SEARCH = ["--searches", "600", "--lenses", "1", "--time", "600"]
+SEARCH = ["--searches", "100", "--lenses", "1", "--time", "600"]
 
 
 @pytest.fixture
@@ -302,17 +306,17 @@ def test_an_ended_and_a_killed_search_resume_to_the_same_lenses(folder, plain, r
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
 def test_a_signal_after_the_work_ends_the_process_without_a_word():
+    """As `python -m flarewright`."""
     code = (
-        "import atexit, os, signal, sys\n"
-        "from flarewright.cli.app import main\n"
+        "import atexit, os, runpy, signal, sys\n"
         "atexit.register(lambda: os.kill(os.getpid(), signal.SIGTERM))\n"
         "sys.argv = ['flarewright', '--version']\n"
-        "main()"
+        "runpy.run_module('flarewright', run_name='__main__')"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == -signal.SIGTERM
     assert done.stderr == ""
-    assert "flarewright" in done.stdout
+    assert done.stdout == f"flarewright {__version__}\n"
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])

@@ -66,20 +66,23 @@ def test_ctrl_c_ends_a_search_and_keeps_the_best(folder, capsys, monkeypatch):
 
 # the package cmaes loads most of SciPy
 @pytest.mark.parametrize(
-    ("third", "package", "seconds"),
-    [("sade:2x2", "pygmo", "0.03"), pytest.param("cmaes", "cmaes", "0.2", marks=pytest.mark.slow)],
+    ("names", "packages", "seconds"),
+    [
+        (["pools", "sade:2x2"], ["pygmo"], "0.02"),
+        pytest.param(["pools", "pso:2x2", "cmaes"], ["pygmo", "cmaes"], "0.2", marks=pytest.mark.slow),
+    ],
+    ids=["two", "three"],
 )
-def test_benchmark_compares_solvers(folder, capsys, third, package, seconds):
-    for needed in ("pygmo", package):
+def test_benchmark_compares_solvers(folder, capsys, names, packages, seconds):
+    for needed in packages:
         pytest.importorskip(needed, reason=f"the extra evo is not installed: no {needed}")
     words = ["design", "benchmark", "heliar", "--unsigned", "--seeds", "2", "--time", seconds, "--report", "a.html"]
-    names = ["pools", "pso:2x2", third]
     assert run([*words, *(part for name in names for part in ("--solver", name)), "--json"]) == 0
     reported = json.loads(capsys.readouterr().out)
     assert [(one["solver"], one["seed"]) for one in reported["runs"]] == [
         (name, seed) for name in names for seed in (0, 1)
     ]
-    assert [one["saw"] for one in reported["runs"][::2]] == ["ours", "algorithm1", "algorithm1"]
+    assert [one["saw"] for one in reported["runs"][::2]] == ["ours", *["algorithm1"] * (len(names) - 1)]
     for one in reported["runs"][2:]:
         # not every step decreases this value: focal length and f-number are part of the cost
         fitness = [point["fitness_algorithm1"] for point in one["trace"]]

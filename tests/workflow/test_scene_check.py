@@ -1,8 +1,6 @@
 """`flarewright scene check` reports the errors of `flarewright predict`, each with its camera and key."""
 
 import json
-import subprocess
-import sys
 
 import pytest
 
@@ -160,24 +158,3 @@ def test_cameras_that_can_be_used_are_usable(scene, capsys):
     )
     assert run(["scene", "check", str(file)]) == 0
     assert "usable, 3 cameras, 1 light" in capsys.readouterr().out
-
-
-def test_what_traces_rays_is_not_loaded_for_a_scene_that_fails_without_it(scene):
-    code = """
-import sys
-from flarewright.cli.app import run
-for file in sys.argv[1:]:
-    assert run(["scene", "check", file]) == 2, file
-    loaded = {"numba", "scipy", "flarewright.render", "flarewright.measure"} & set(sys.modules)
-    assert not loaded, (file, loaded)
-"""
-    files = []
-    for name, lines, aim in (
-        ("iso", 'lens = "nope"\niso = 0', "[0, 10, 0]"),
-        ("aim", 'lens = "nope"', "[0, 0, 0]"),
-        ("model", measured("nope.json"), "[0, 10, 0]"),
-    ):
-        file = scene(lines, aim=aim)
-        files.append(str(file.rename(file.with_name(f"{name}.toml"))))
-    done = subprocess.run([sys.executable, "-c", code, *files], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 import time
 
@@ -80,18 +79,6 @@ def test_a_scheduler_that_is_lost_while_items_are_submitted_is_one_sentence():
     connection.client.submit = broken
     with pytest.raises(FlarewrightError, match=r"the connection with the cluster is lost \(RuntimeError\)"):
         through(connection, items=range(1000))
-
-
-def test_without_a_cluster_dask_is_not_imported(tmp_path):
-    with open_cluster(None, tmp_path) as cluster:
-        assert cluster is None
-    code = (
-        "import sys\nfrom flarewright.jobs.cluster.executor import open_cluster\n"
-        "with open_cluster(None, '.') as none:\n    assert none is None\n"
-        "import flarewright.workflow.shot\n"
-        "assert not {'dask', 'distributed', 'cryptography'} & set(sys.modules)"
-    )
-    subprocess.run([sys.executable, "-c", f"import sys; sys.path[:] = {sys.path!r}\n{code}"], check=True)
 
 
 def test_a_missing_package_is_one_sentence(tmp_path, monkeypatch):
