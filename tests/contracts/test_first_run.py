@@ -424,15 +424,26 @@ with warmup_processes.head_start():
 INDEX = f"tracing_0/pupil_prepass.find_box-57.py{sys.version_info.major}{sys.version_info.minor}.nbi"
 
 
+class IdleHelper(subprocess.Popen):
+    """A process that does nothing, as a real helper takes half a second; waiting for it compiles its share here."""
+
+    def __init__(self, share):
+        super().__init__([sys.executable, "-S", "-c", ""], stdin=subprocess.PIPE)
+        self.share = list(share)
+
+    def wait(self, timeout=None):
+        while self.share:
+            name = self.share.pop()
+            decorators.compiled(warmup.kernel(name).py_func).compile(warmup.types(name))
+        return super().wait(timeout)
+
+
 @pytest.mark.parametrize("processes", [1, 2])
 def test_a_command_uses_its_head_start(processes, cold, monkeypatch):
     monkeypatch.setattr(warmup_processes, "cores", lambda: 2)
     monkeypatch.setattr(warmup_processes, "tracing_roots", lambda: ["collect"])
-    if processes == 1:
-        # with one process the test only waits for the helper's end, so an idle process replaces it: a real one takes
-        # half a second
-        idle = [sys.executable, "-S", "-c", ""]
-        monkeypatch.setattr(warmup_processes, "start", lambda share: subprocess.Popen(idle, stdin=subprocess.PIPE))
+    # with one process the command only waits for the helper's end
+    monkeypatch.setattr(warmup_processes, "start", lambda share: IdleHelper(share if processes == 2 else ()))
     with warmup_processes.head_start():
         (helper,) = warmup_processes.ahead()
         assert helper.names == ("collect",)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2] / "src" / "flarewright"
+# a statement, at the start of a line, that may import a module of the package; parsing whole files takes longer
+STARTS = r"from[ \t]+(?:\.|flarewright\b)[\w.]*[ \t]+import\b|import[ \t]+flarewright\b"
+IMPORT = re.compile(rf"^[ \t]*((?:{STARTS})[^(\n]*(?:\([^()]*\))?)", re.MULTILINE)
 
 
 def module_name(path: Path) -> str:
@@ -37,11 +41,16 @@ def imports_of(name: str, is_package: bool, tree: ast.AST, known: set[str]) -> s
     return (found & known) - {name}
 
 
+def import_statements(text: str) -> ast.AST:
+    """Return the tree of a source's import statements alone, those of strings among them."""
+    return ast.parse("\n".join(IMPORT.findall(text)))
+
+
 def graph() -> dict[str, set[str]]:
     """Return the imports of every module of the package."""
     files = {module_name(path): path for path in ROOT.rglob("*.py")}
     return {
-        name: imports_of(name, path.name == "__init__.py", ast.parse(path.read_text("utf-8")), set(files))
+        name: imports_of(name, path.name == "__init__.py", import_statements(path.read_text("utf-8")), set(files))
         for name, path in files.items()
     }
 
@@ -77,7 +86,8 @@ def cycles(edges: dict[str, set[str]]) -> list[list[str]]:
 def test_cycles_are_found() -> None:
     assert cycles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == [["a", "b", "c"]]
     assert cycles({"a": {"b"}, "b": set()}) == []
-    tree = ast.parse("if 1:\n    from .x import y\ndef f():\n    from .. import errors\nimport flarewright.z\n")
+    text = "if 1:\n    from .x import y\ndef f():\n    from .. import (\n        errors,\n    )\nimport flarewright.z\n"
+    tree = import_statements(text)
     known = {"flarewright.p.x", "flarewright.errors", "flarewright.z", "flarewright.p.m"}
     assert imports_of("flarewright.p.m", False, tree, known) == known - {"flarewright.p.m"}
 

@@ -17,8 +17,9 @@ ALIASES = {
     "Callable[[float, str], None]",
     "Callable[[str], None]",
 }
-# parse only modules that have such a line
-ALIAS = re.compile(r"^\w+ = .*\[", re.MULTILINE)
+# parse only modules that have a line that may be one
+NAMES = "|".join(flarewright.typing.__all__)
+ALIAS = re.compile(rf"^(?:{NAMES})\b.*=|^\w.*= \(?\s*(?:NDArray|Callable)\[", re.MULTILINE)
 
 
 def aliases(source: str) -> list[tuple[str, str]]:

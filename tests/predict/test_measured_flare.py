@@ -65,7 +65,7 @@ def test_its_flare_is_the_replayed_flare_per_lux_without_the_light(file):
     for angle in (12.0, 25.0):
         expected = summed(planted(), angle, 40.0) / 10.0
         assert mean_of(planted(), angle, 40.0) == pytest.approx(expected, rel=2e-3)
-    ghosts = next(one for one in replay_model(planted(), 12.0, size_px=(960, 540)) if one.name == "ghosts").pixels
+    ghosts = next(one for one in replay_model(planted(), 12.0, size_px=(480, 270)) if one.name == "ghosts").pixels
     alone = float((ghosts @ luminance_weights("rec709")).mean()) / 10.0
     assert mean_of(planted(), 12.0, ghosts_only=True) == pytest.approx(alone, rel=2e-3)
     assert mean_of(planted(), 12.0) > 1.2 * alone

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from singlet_file import singlet_file
 
 from flarewright.cli.app import run
 from flarewright.cli.common import remembered
@@ -114,8 +115,8 @@ def test_a_tail_that_falls_by_decades_is_met_between_few_samples():
 
 def test_an_interrupted_prediction_resumes_beside_its_output(tmp_path, capsys, monkeypatch):
     page = tmp_path / "h.html"
-    words = "predict triplet-pestrecov --fstop 16 --quality draft --samples 7 -o"
-    arguments = [*words.split(), str(page)]
+    words = "--fstop 16 --quality draft --samples 5 -o"
+    arguments = ["predict", singlet_file(tmp_path), *words.split(), str(page)]
     drawn = 0
     real = table.luminance
 
@@ -126,7 +127,7 @@ def test_an_interrupted_prediction_resumes_beside_its_output(tmp_path, capsys, m
         drawn += 1
         return real(picture)
 
-    monkeypatch.setattr(table, "luminance", lambda picture: counted(picture, 5))
+    monkeypatch.setattr(table, "luminance", lambda picture: counted(picture, 3))
     assert run(arguments) == 130
     assert not page.exists()
     assert (tmp_path / "h.partial.npz").is_file()
@@ -135,14 +136,14 @@ def test_an_interrupted_prediction_resumes_beside_its_output(tmp_path, capsys, m
     monkeypatch.setattr(table, "luminance", lambda picture: counted(picture, -1))
     assert run([*arguments, "--json"]) == 0
     reported = capsys.readouterr()
-    assert "resuming with 5 pictures" in reported.err
+    assert "resuming with 3 pictures" in reported.err
     again = drawn
     # pictures of the interrupted run are reused, and its file is removed
     assert not (tmp_path / "h.partial.npz").exists()
     drawn = 0
     assert run([*arguments, "--json"]) == 0
     assert capsys.readouterr().out == reported.out
-    assert drawn == again + 5
+    assert drawn == again + 3
 
 
 def test_a_given_cache_stays_and_nothing_is_kept_without_output(tmp_path):
@@ -155,8 +156,9 @@ def test_a_given_cache_stays_and_nothing_is_kept_without_output(tmp_path):
 
 
 def test_a_prediction_without_output_resumes_from_the_state_folder_with_its_checks(tmp_path, capsys, monkeypatch):
-    monkeypatch.setenv("FLAREWRIGHT_STATE", str(tmp_path))
-    arguments = ["predict", "heliar-tronnier", "--fstop", "16", "--quality", "draft", "--samples", "5", "--check", "2"]
+    lens = singlet_file(tmp_path)
+    monkeypatch.setenv("FLAREWRIGHT_STATE", str(tmp_path / "state"))
+    arguments = ["predict", lens, "--fstop", "16", "--quality", "draft", "--samples", "5", "--check", "2"]
     drawn, real = [], Flare.picture
 
     def run_until(most):
@@ -174,11 +176,11 @@ def test_a_prediction_without_output_resumes_from_the_state_folder_with_its_chec
     every = len(drawn)
     assert code == 0
     assert every == 7
-    assert list((tmp_path / "partial").iterdir()) == []
+    assert list((tmp_path / "state" / "partial").iterdir()) == []
     code, reported = run_until(every - 1)
     assert code == 130
     assert "the same command resumes" in reported.err
-    (kept,) = (tmp_path / "partial").iterdir()
+    (kept,) = (tmp_path / "state" / "partial").iterdir()
     # another command has another file
     assert run([*arguments, "--roll", "1", "--json"]) == 130
     assert kept.is_file()

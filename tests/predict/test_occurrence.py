@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 from painted import disc_light, painted
+from singlet_file import singlet_file
 
 from flarewright.cli.app import run
 from flarewright.errors import FlarewrightError
@@ -180,7 +181,7 @@ def test_five_blades_are_drawn_at_four_rolls_and_turned_to_all_others():
 
 def test_command_reports_curves_and_writes_a_page_that_asks_for_nothing(tmp_path, capsys):
     page = tmp_path / "report.html"
-    arguments = ["heliar-tronnier", "--fstop", "8", "--quality", "draft", "--samples", "7", "--check", "1"]
+    arguments = [singlet_file(tmp_path), "--fstop", "8", "--quality", "draft", "--samples", "7", "--check", "1"]
     arguments += ["--luminance", "50,5000"]
     assert run(["predict", *arguments, "-o", str(page), "--json"]) == 0
     data = json.loads(capsys.readouterr().out)

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from painted import painted
+from singlet_file import singlet_file
 
 from flarewright.cli.app import run
 from flarewright.cli.common import remembered
@@ -564,7 +565,9 @@ def test_command_plans_a_scene_and_its_veil_is_that_of_a_final_render(step_s, tm
     # bare glass reflects all colours almost alike
     monkeypatch.setattr("flarewright.workflow.lens_flares.JUDGED_NM", 3)
     file, page, cache = tmp_path / "s.toml", tmp_path / "s.html", tmp_path / "s.npz"
-    file.write_text(SCENE.replace("position_m = [0.0, -20.0, 2.0]", "f_number = 8.0\nposition_m = [0.0, -20.0, 2.0]")
+    given = SCENE.replace("triplet-pestrecov", "singlet.toml" if step_s > 10.0 else "triplet-pestrecov")
+    singlet_file(tmp_path)
+    file.write_text(given.replace("position_m = [0.0, -20.0, 2.0]", "f_number = 8.0\nposition_m = [0.0, -20.0, 2.0]")
                     .replace("position_m = [5.0", "f_number = 8.0\nposition_m = [5.0")
                     .replace("step_s = 10.0", f"step_s = {step_s}"))  # fmt: skip
     arguments = [

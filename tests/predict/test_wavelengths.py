@@ -73,10 +73,12 @@ def test_flare_of_a_quarter_wave_is_that_of_31_even_wavelengths():
         lights=(Light(field_deg=(12.0, 3.0)),), camera=Camera(size_px=(48, 32), sensor_mm=(36.0, 24.0)),
         output=Output(starburst=False),
     )  # fmt: skip
+    # rings move light within the picture
+    even = Quality(wavelengths=31, bridge=False, ringing="off")
 
     def mean(given):
         return float((render(given).layers[0].pixels.astype(float) @ luminance_weights("rec709")).mean())
 
-    truth = mean(project.replace(quality=Quality(wavelengths=31, bridge=False)))
+    truth = mean(project.replace(quality=even))
     assert mean(luminous(project, statistics_quality("final"))) == pytest.approx(truth, rel=0.015)
-    assert mean(project.replace(quality=Quality(wavelengths=3, bridge=False))) > 1.1 * truth
+    assert mean(project.replace(quality=even.replace(wavelengths=3))) > 1.1 * truth

@@ -116,7 +116,8 @@ def prepare(folder: Path) -> None:
     with ZipFile(folder / "lens.zip", "w") as archive:
         archive.write(folder / "lens.toml", "tessar/lens.toml")
     library = ("library", "add", "lens.toml", "--name", "mine")
-    for words in (merge, library, ("design", "solve", "shot.toml", "-o", "searched", "--time", "0.2")):
+    search = ("design", "solve", "shot.toml", "-o", "searched", "--searches", "40", "--lenses", "1")
+    for words in (merge, library, search):
         held, answer = judged(words, folder, keep=True)
         assert (held, answer) == (True, "done"), f"{' '.join(words)}: {answer}"
 

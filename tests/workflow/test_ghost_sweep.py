@@ -7,6 +7,7 @@ import io
 import json
 
 import pytest
+from singlet_file import singlet_file
 
 from flarewright.cli.app import run
 from flarewright.cli.render.ghost_sweep import sweep_axes
@@ -20,15 +21,16 @@ from flarewright.workflow.ghost_sweep import along, surface_gains, sweep_ghosts
 LENS = "triplet-pestrecov"
 
 
-def swept(coating, fields=((0.0, 0.0),), wavelengths=(550.0,), f_numbers=(8.0,)):
+def swept(coating, fields=((0.0, 0.0),), wavelengths=(550.0,), f_numbers=(8.0,), lens=LENS):
     project = Project.model_validate(
-        {"lens": LENS, "coating": coating_choice(coating), "lights": [{"field_deg": (0.0, 0.0)}]}
+        {"lens": lens, "coating": coating_choice(coating), "lights": [{"field_deg": (0.0, 0.0)}]}
     )
     return tuple(sweep_ghosts(project, GhostQuery((0.0, 0.0)), fields, wavelengths, f_numbers))
 
 
-def test_each_point_is_the_analysis_of_its_combination():
-    points = swept("none", ((0.0, 0.0), (6.0, 8.0)), (450.0, 650.0), (8.0, 11.0))
+def test_each_point_is_the_analysis_of_its_combination(tmp_path):
+    lens = singlet_file(tmp_path)
+    points = swept("none", ((0.0, 0.0), (6.0, 8.0)), (450.0, 650.0), (8.0, 11.0), lens)
     assert [(point.f_number, point.field_deg, point.wavelength_nm) for point in points] == [
         (f_number, field, wavelength)
         for f_number in (8.0, 11.0)
@@ -36,7 +38,7 @@ def test_each_point_is_the_analysis_of_its_combination():
         for wavelength in (450.0, 650.0)
     ]
     last = points[-1]
-    wanted = ghosts(LENS, (6.0, 8.0), f_number=11.0, wavelength_nm=650.0, coating="none")
+    wanted = ghosts(lens, (6.0, 8.0), f_number=11.0, wavelength_nm=650.0, coating="none")
     assert last.table.ghosts == wanted.ghosts
 
 
@@ -80,8 +82,8 @@ def test_axes():
         sweep_axes(["field=1", "field=2"])
 
 
-def test_the_command_prints_a_table_json_and_csv(capsys):
-    words = ["ghosts", LENS, "--light", "5,0", "--sweep", "field=0,5", "--sweep", "fstop=8"]
+def test_the_command_prints_a_table_json_and_csv(tmp_path, capsys):
+    words = ["ghosts", singlet_file(tmp_path), "--light", "5,0", "--sweep", "field=0,5", "--sweep", "fstop=8"]
     assert run([*words, "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert len(data["points"]) == 2
