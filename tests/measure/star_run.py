@@ -9,7 +9,9 @@ from synthetic_camera import Setup, expose
 
 CAMERA = Setup(size_px=(96, 64), exposures_s=(1 / 256, 1 / 8), seed=4)
 HEAD = "file,constellation_deg,exposure_s,iso,f_number,kind\n"
-ANGLES = tuple(float(k) for k in range(6))
+ANGLES = tuple(float(k) for k in range(4))
+# for tests of what the path of the light alone shows, and of several groups of frames
+MANY = tuple(float(k) for k in range(6))
 
 
 def light_px(angle: float) -> tuple[float, float]:

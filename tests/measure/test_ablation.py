@@ -42,11 +42,11 @@ def shown(level=1.0):
 
 
 def test_merging_corrects_a_drift_of_at_least_so_many_frames(tmp_path):
-    gains = 1.0 + 0.03 * np.random.default_rng(4).normal(size=10)
+    gains = 1.0 + 0.03 * np.random.default_rng(4).normal(size=6)
     scenes = {0.5 * k: star(light_px(0.5 * k)) * np.float32(gain) for k, gain in enumerate(gains)}
     captures = read_captures(shoot(tmp_path, scenes))
     assert all(frame.gain != 1.0 for frame in merge_captures(captures, tmp_path, tmp_path / "run").frames)
-    settings = MergeSettings(drift=DriftSettings(least_frames=11))
+    settings = MergeSettings(drift=DriftSettings(least_frames=7))
     run = merge_captures(captures, tmp_path, tmp_path / "run", settings=settings)
     assert {frame.gain for frame in run.frames} == {1.0}
 

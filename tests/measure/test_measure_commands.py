@@ -46,7 +46,7 @@ def test_merge_reports_its_result_and_run_continues(listed, tmp_path, capsys):
     assert (folder / "merged.png").stat().st_size > 1000
     before = (folder / "frames" / "frame-003.exr").stat().st_mtime_ns
     assert run(["measure", "run", str(listed), "-o", str(folder), "--stages", "merge"]) == 0
-    assert "6 frames of 96x64 pixels, the light seen in 6" in capsys.readouterr().out
+    assert f"{len(ANGLES)} frames of 96x64 pixels, the light seen in {len(ANGLES)}" in capsys.readouterr().out
     assert (folder / "frames" / "frame-003.exr").stat().st_mtime_ns == before
     assert len(read_run(folder).frames) == len(ANGLES)
 
@@ -103,7 +103,7 @@ def test_pictures_without_light_and_a_list_without_exposures_are_refused(listed,
     command = ("measure", "merge", listed, "-o", tmp_path / "run")
     text = listed.read_text()
     listed.write_text(text.replace("exposure_s", "focal_mm"))
-    assert "12 of 12 photographs have no exposure_s" in refused(capsys, *command)
+    assert "8 of 8 photographs have no exposure_s" in refused(capsys, *command)
     listed.write_text(text)
     rng = np.random.default_rng(3)
     for path in tmp_path.glob("*.npy"):
@@ -150,12 +150,12 @@ def test_a_full_disk_is_reported_before_and_while_writing(listed, tmp_path, caps
     rename = os.replace
 
     def full(source, target):
-        if str(target).endswith("frame-004.exr"):
+        if str(target).endswith("frame-002.exr"):
             raise OSError(errno.ENOSPC, "No space left on device")
         rename(source, target)
 
     with monkeypatch.context() as patch:
         patch.setattr(os, "replace", full)
-        assert "frame-004.exr: no space left on device" in refused(capsys, *command)
+        assert "frame-002.exr: no space left on device" in refused(capsys, *command)
     assert not list((tmp_path / "run" / "frames").glob(".*"))
     assert run([str(word) for word in command]) == 0
