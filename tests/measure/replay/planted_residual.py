@@ -4,7 +4,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from planted_run import LARGEST, SIZE, shape, views
+from planted_run import LARGEST, shape, views
 
 from flarewright.kernels.ghost_model.pupil_mesh import SOFT
 from flarewright.measure.core.parameters import Shape
@@ -15,9 +15,11 @@ from flarewright.measure.residual.motion_fit import with_moves
 from flarewright.measure.residual.sprite_fit import axis_sprite
 from flarewright.model.measurement.ghost_model import GhostModel
 
+# a strip that holds both ghosts of `TRUE`
+SIZE = (240, 84)
 CAPTURED = np.arange(1.0, LARGEST + 0.1, 1.0)
 # captures in which one ghost of `TRUE` begins to leave the picture
-FEW = CAPTURED[9:15]
+FEW = CAPTURED[10:15]
 
 
 def soft(speed: float, size: float, level: float) -> Shape:
@@ -47,7 +49,7 @@ def between(captured: np.ndarray) -> np.ndarray:
 
 def model_of(shapes: tuple[Shape, ...], captured: np.ndarray = CAPTURED) -> tuple[GhostModel, list]:
     """Return a model of some ghosts, and the residual of the captures."""
-    seen = views(TRUE, angles=captured, noise=0.001)
+    seen = views(TRUE, angles=captured, noise=0.001, size=SIZE)
     return model_beside(shapes, seen), seen
 
 
@@ -72,6 +74,11 @@ def moving(known: str, captured: tuple[float, ...]) -> tuple[GhostModel, GhostMo
     """Return a model before and after it has moves, and the captures; cached for all tests."""
     model, seen = model_of(KNOWN[known], np.array(captured))
     return model, with_moves(model), seen
+
+
+def truth_between(captured: np.ndarray) -> list:
+    """Return noise-free views halfway between captures."""
+    return views(TRUE, angles=between(captured), noise=0.0, size=SIZE)
 
 
 def missed(model: GhostModel, truth: list) -> float:

@@ -6,8 +6,8 @@ from zlib import compress
 
 import numpy as np
 import pytest
-from planted_residual import CAPTURED, FEW, TRUE, between, missed, model_beside, moving, soft
-from planted_run import SIZE, views
+from planted_residual import CAPTURED, FEW, SIZE, between, missed, model_beside, moving, soft, truth_between
+from planted_run import views
 
 from flarewright.measure.core.parameter_vector import frame
 from flarewright.measure.replay.clamping import clamped
@@ -38,9 +38,9 @@ def captured(request):
 def at_an_edge(captured):
     """Return a model of ghosts without the edge that cuts them, and the truth between captures."""
     ghosts = (soft(150.0, 12.0, 1.0), soft(60.0, 18.0, 0.6))
-    seen = cut(views(ghosts, angles=captured, noise=0.001))
+    seen = cut(views(ghosts, angles=captured, noise=0.001, size=SIZE))
     model = with_moves(model_beside(ghosts, seen))
-    return model, with_reaches(model, seen), cut(views(ghosts, angles=between(captured), noise=0.0))
+    return model, with_reaches(model, seen), cut(views(ghosts, angles=between(captured), noise=0.0, size=SIZE))
 
 
 def test_light_that_an_edge_cuts_off_is_not_drawn_beyond_it(at_an_edge, captured):
@@ -75,7 +75,7 @@ def test_at_captures_nothing_changes(at_an_edge, captured):
 )
 def test_ghosts_that_move_are_left_to_move(known, captured):
     _, model, seen = moving(known, tuple(captured))
-    truth = views(TRUE, angles=between(captured), noise=0.0)
+    truth = truth_between(captured)
     assert missed(with_reaches(model, seen), truth) < 1.01 * missed(model, truth)
 
 

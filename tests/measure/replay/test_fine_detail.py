@@ -20,7 +20,7 @@ from flarewright.model.measurement.ghost_model import GhostModel
 
 SIZE = (270, 120)
 AXIS = (135.0, 60.0)
-ANGLES = tuple(float(k) for k in range(1, 8))
+ANGLES = tuple(float(k) for k in range(1, 7))
 NOISE = 1e-3
 # rows of the picture: fixed grains, grains that move three pixels right per half step, and grains that always change
 STILL, GOES, NEW = np.s_[4:36], np.s_[44:76], np.s_[84:116]
@@ -63,26 +63,27 @@ def grains():
     return coarse, with_detail(coarse, captured, left(coarse, captured)), captured
 
 
-def missed(model, angle, rows):
-    columns = np.s_[60:-60]
-    return float(((replay_model(model, angle)[0].pixels - scene(angle))[rows, columns] ** 2).mean())
+def missed(model, angle, *places):
+    """Return the mean squared error of a replay in each of some rows."""
+    error = (replay_model(model, angle)[0].pixels - scene(angle))[:, 60:-60]
+    return np.array([(error[rows] ** 2).mean() for rows in places])
 
 
 def test_captures_are_replayed_grain_by_grain(grains):
     coarse, fine, captured = grains
-    for view in captured:
-        for rows in (STILL, GOES, NEW):
-            assert missed(fine, view.constellation_deg, rows) < 0.01 * missed(coarse, view.constellation_deg, rows)
+    for view in captured[::2]:
+        ours, theirs = (missed(model, view.constellation_deg, STILL, GOES, NEW) for model in (fine, coarse))
+        assert (ours < 0.01 * theirs).all()
 
 
 def test_between_captures_detail_stays_or_goes_as_what_is_around_it(grains):
     coarse, fine, _ = grains
+    # blocks beside moving ones average both
+    still = np.s_[4:24]
     for angle in (2.5, 4.5, 5.5):
-        # blocks beside moving ones average both
-        still = np.s_[4:24]
-        assert missed(fine, angle, still) < 0.01 * missed(coarse, angle, still)
+        ours, theirs = (missed(model, angle, still, GOES) for model in (fine, coarse))
         # moves are stored to parts of a pixel
-        assert missed(fine, angle, GOES) < 0.2 * missed(coarse, angle, GOES)
+        assert (ours < np.array([0.01, 0.2]) * theirs).all()
 
 
 def test_unpredictable_detail_is_not_drawn_between_captures(grains):
@@ -102,7 +103,7 @@ def test_nothing_leaps_next_to_captures(grains):
 
 
 def test_noise_is_no_detail():
-    captured = [view.showing(view.pixels - scene(view.constellation_deg)) for view in seen(ANGLES[:5], noise=0.01)]
+    captured = [view.showing(view.pixels - scene(view.constellation_deg)) for view in seen(ANGLES[:4], noise=0.01)]
     sprite = axis_sprite(captured, [view.pixels for view in captured])
     empty = GhostModel(
         size_px=SIZE, axis_px=AXIS, focal_px=1e3, largest_deg=ANGLES[-1],
@@ -110,8 +111,8 @@ def test_noise_is_no_detail():
     )  # fmt: skip
     fine = with_detail(with_moves(empty), captured, [view.pixels for view in captured])
     (sprite,) = fine.sprites
-    assert (sprite.detail.picture(3, sprite.rows, sprite.columns) != 0.0).mean() < 0.02
-    assert np.abs(detail_at(sprite, sprite.detail, 3.5)).max() < 0.01
+    assert (sprite.detail.picture(2, sprite.rows, sprite.columns) != 0.0).mean() < 0.02
+    assert np.abs(detail_at(sprite, sprite.detail, 2.5)).max() < 0.01
 
 
 def test_what_is_not_known_has_no_detail(grains):

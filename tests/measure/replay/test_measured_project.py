@@ -281,7 +281,7 @@ def test_the_sensor_of_the_captures_gives_focal_length_and_sums(project, tmp_pat
 
 def test_any_project_is_drawn_by_what_stands_in_its_lens_place(project):
     assert render_any(project).summary["measured"]
-    lens = render_any(Project(lens="heliar-tronnier", lights=(light(),), camera=Camera(size_px=(64, 36)),
+    lens = render_any(Project(lens="triplet-pestrecov", lights=(light(),), camera=Camera(size_px=(64, 36)),
                               quality={"mode": "draft"}))  # fmt: skip
     assert "measured" not in lens.summary
 

@@ -7,8 +7,7 @@ from zlib import compress
 
 import numpy as np
 import pytest
-from planted_residual import CAPTURED, FEW, TRUE, between, missed, model_of, moving
-from planted_run import views
+from planted_residual import CAPTURED, FEW, TRUE, missed, model_of, moving, truth_between
 
 from flarewright.measure.replay.ghost_arrays import pack
 from flarewright.measure.replay.model_image import replay_model
@@ -40,13 +39,13 @@ def unknown(captured):
 
 def test_unknown_ghosts_are_predicted_between_captures(unknown, captured):
     before, after = unknown
-    truth = views(TRUE, angles=between(captured), noise=0.0)
+    truth = truth_between(captured)
     assert missed(after, truth) < 0.3 * missed(before, truth)
 
 
 def test_the_residual_of_a_mistaken_ghost_is_predicted_between_captures(captured):
     model, with_its_moves, _ = moving("mistaken", tuple(captured))
-    truth = views(TRUE, angles=between(captured), noise=0.0)
+    truth = truth_between(captured)
     assert missed(with_its_moves, truth) < 0.1 * missed(model, truth)
     assert missed(with_its_moves, truth) < 0.01 * missed(cast(GhostModel, model.replace(sprites=())), truth)
     # the residual alone moves differently from its sum with the ghosts' light

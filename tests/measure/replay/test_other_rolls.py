@@ -16,7 +16,7 @@ from flarewright.model.measurement.sprite import Sprite, encode_pictures
 
 SIZE = (240, 160)
 AXIS = (120.0, 80.0)
-ANGLES = np.linspace(2.0, LARGEST, 10)[2:9]
+ANGLES = np.linspace(2.0, LARGEST, 10)[3:8]
 # radiance of the picture, and of a ghost over the whole picture that the model draws six times as bright
 TRUE, TAKEN = 0.02, 0.12
 
@@ -69,7 +69,7 @@ def learned():
 @pytest.mark.parametrize(
     "roll", [0.0, pytest.param(30.0, marks=pytest.mark.slow), 90.0, pytest.param(180.0, marks=pytest.mark.slow), 260.0]
 )
-@pytest.mark.parametrize("angle", [ANGLES[2], ANGLES[5]])
+@pytest.mark.parametrize("angle", [ANGLES[1], ANGLES[3]])
 def test_a_rolled_replay_turns_the_true_picture_and_keeps_half_of_the_residual(learned, roll, angle):
     # the ghost and the negative residual that corrects it are six times the picture: at the photographed roll neither
     # shows, and at others half of the ghost's excess does (docs/adr/0021)
@@ -110,7 +110,7 @@ def test_no_pixel_is_below_0_where_the_residual_exceeds_a_ghost():
 
 
 def test_a_star_keeps_its_orientation_and_all_else_turns():
-    seen = lights(0.05)
+    seen = lights(0.05, ANGLES[:4])
     still, turning = (light_sprites(seen, [view.pixels for view in seen], starry) for starry in (True, False))
     assert all(one.rolls_deg for one in turning)
     assert [bool(one.rolls_deg) for one in still] == sorted((bool(one.rolls_deg) for one in still), reverse=True)

@@ -135,7 +135,7 @@ def test_sprites_that_follow_the_light_are_predicted_between_constellations():
 
 
 def test_the_residual_stays_about_the_axis_at_both_sides_and_where_nothing_was_measured():
-    angles = np.concatenate([-ANGLES[:6][::-1], ANGLES[:6]])
+    angles = np.concatenate([-ANGLES[:4][::-1], ANGLES[:4]])
     seen = []
     for view in views((), angles=angles, roll_deg=20.0, noise=0.001):
         placed = frame((122.3, 78.4), 20.0, view.constellation_deg, 1.0)
@@ -180,7 +180,7 @@ def test_the_lights_place_follows_the_lens_distortion():
 def test_a_replay_with_its_rest_is_the_capture():
     model = planted().replace(star=None)
     seen = []
-    for k, angle in enumerate((2.0, 8.0, 14.0, 20.0)):
+    for k, angle in enumerate((2.0, 11.0, 20.0)):
         placed = frame(model.axis_px, 0.0, angle, 1.0)
         rest = 0.2 * np.outer(np.hanning(90), np.hanning(160))[..., None] * (1.0 + k)
         pixels = (replay_model(model, angle)[0].pixels + rest).astype(np.float32)

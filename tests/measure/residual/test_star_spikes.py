@@ -11,7 +11,7 @@ from flarewright.measure.residual.sprite_fit import drawn
 from flarewright.measure.residual.star_spikes import spike_sprites
 from flarewright.model.measurement.ghost_model import Star
 
-ANGLES = np.linspace(1.0, LARGEST, 10)
+ANGLES = np.linspace(1.0, LARGEST, 7)
 STAR = Star(spikes=6, first_deg=20.0, width_px=1.3, radius_px=(4.0, 400.0), radiance=((9.0,) * 3, (0.2,) * 3))
 
 
