@@ -43,7 +43,7 @@ def test_unmeasured_pixels_yield_no_blob():
 
 @pytest.mark.parametrize("others", [GHOSTS[1:2], pytest.param(GHOSTS[1:3], marks=pytest.mark.slow)])
 def test_a_blob_is_fitted(others, no_crescents):
-    shown = views((*others, BLOB), angles=FEW[::2])
+    shown = views((*others, BLOB), angles=FEW[::2], size=(240, 110))
     found = pursue(shown, everywhere(shown), most=len(others) + 1)
     best = min(found, key=lambda ghost: abs(ghost.shapes[1].numbers[0] - 70.0))
     numbers = best.shapes[1].numbers

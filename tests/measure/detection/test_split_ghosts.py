@@ -14,7 +14,7 @@ from flarewright.measure.fitting.footprint import footprint, overlap
 from flarewright.measure.fitting.ghost_fit import refine
 from flarewright.measure.fitting.patches import patches_of
 
-ANGLES = np.linspace(4.0, 22.0, 10)
+ANGLES = np.linspace(4.0, 22.0, 6)
 
 
 def pair(side: float = 1.0) -> tuple[Shape, Shape]:

@@ -37,7 +37,7 @@ def test_a_fit_from_far_does_not_end_in_a_wrong_valley():
 
 
 def test_a_false_rim_from_the_search_is_removed_by_the_fit():
-    seen = views((TRUE,), angles=FEW)
+    seen = views((TRUE,), angles=FEW[::2])
     numbers = TRUE.numbers.copy()
     numbers[FIRST_DISC : FIRST_DISC + 3] = -0.8, 0.0, 0.9
     cut = Shape(numbers, 1)

@@ -82,7 +82,7 @@ def test_births_and_deaths_and_their_reasons():
 
 def test_a_drifting_ghost_is_tracked():
     """Its position drifts by a third of its size over the range, too far for a fit without prediction."""
-    ghosts, few = (shape(-60.0, 9.0, 1.0),), ANGLES[::2]
+    ghosts, few = (shape(-60.0, 9.0, 1.0),), ANGLES[::3]
     seen = drawn(ghosts, lambda _, angle: Pose(1.0, 0.2 * angle, 1.0), angles=few)
     (track,) = follow(("1",), grey(ghosts), seen).ghosts
     assert {step.state for step in track.steps} == {"seen"}
@@ -90,7 +90,7 @@ def test_a_drifting_ghost_is_tracked():
 
 
 def test_noise_has_no_lives():
-    seen = drawn((), lambda *_: Pose(), angles=ANGLES[::3])
+    seen = drawn((), lambda *_: Pose(), angles=ANGLES[::4])
     (track,) = follow(("1",), grey((shape(-60.0, 9.0, 1.0),)), seen).ghosts
     assert track.lives == ()
     assert {step.state for step in track.steps} == {"faint"}

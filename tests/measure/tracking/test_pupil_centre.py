@@ -94,7 +94,7 @@ def test_deviations_equal_those_of_random_parameters():
     one = ghost(reported(), curves)
     found = middles_of(one, ANGLES, LARGEST)
     rng, deviation = np.random.default_rng(7), channel_deviation(one.green)
-    n = 40000
+    n = 10000
     drawn = np.zeros((3, n, NUMBERS))
     for m, channel in enumerate((one.red, one.green, one.blue)):
         numbers = np.concatenate([channel.f, channel.g, channel.intensity, np.zeros(21), channel.below])
