@@ -50,7 +50,7 @@ GHOSTS = (
 # the same in pictures of half the size, for tests of several stages
 SMALL = (120, 80)
 SMALL_GHOSTS = tuple(rescaled(one, 0.5) for one in GHOSTS)
-SMALL_ANGLES = np.linspace(2.0, LARGEST, 5)
+SMALL_ANGLES = np.linspace(2.0, LARGEST, 4)
 
 
 @cache
