@@ -382,11 +382,11 @@ def _sentences(read: Callable[[Any], object], data: Any) -> list[str]:
 
 
 def _trials(data: Any, every: bool) -> Iterator[tuple[tuple[Any, ...], Any]]:
-    """Yield places of a file and values to insert: all, or in a long file alternately one half and the other."""
+    """Yield places of a file and values to insert: all, or in a long file every third or fourth, in turn."""
     places = list(_places(data, every=every))
-    half = not every and len(places) > 60
+    parts = 1 if every or len(places) < 10 else 3 if len(places) < 60 else 4
     for k, place in enumerate(places):
-        for value in BAD[k % 2 :: 2] if half else BAD:
+        for value in BAD[k % parts :: parts]:
             yield place, value
 
 
