@@ -5,19 +5,21 @@ import json
 import numpy as np
 import OpenEXR
 import pytest
+from singlet_file import singlet_file
 
 from flarewright.cli.app import run
 from flarewright.io.images.exr import read_exr
 from flarewright.io.render_state.reference_state import read_state
 from flarewright.render.reference import energy_ledger, estimator
 
-SMALL = ["render", "triplet-pestrecov", "--light", "8,4", "--size", "24x16", "--no-starburst", "--no-png", "--ledger"]
+SMALL = ["render", "singlet.toml", "--light", "8,4", "--size", "24x16", "--no-starburst", "--no-png", "--ledger"]
 REFERENCE = [*SMALL, "--quality", "reference"]
 
 
 @pytest.fixture(autouse=True)
 def _folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    singlet_file(tmp_path)
     monkeypatch.setattr(estimator, "SIDE", 16)
     monkeypatch.setattr(energy_ledger, "SIDE", 16)
 
@@ -32,7 +34,7 @@ def test_render_and_go_on(capsys, tmp_path):
     assert "Where the light went" in err
     assert "six or more, beside it" in err
     assert summary["ledger"]["sum"] == pytest.approx(1.0, abs=1e-3)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.exr", "a.state.npz"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.exr", "a.state.npz", "singlet.toml"]
     layers = {layer.name: layer.pixels for layer in read_exr("a.exr").layers}
     # variances are too small for half floats, which the other layers are
     held = OpenEXR.File("a.exr", separate_channels=True).parts

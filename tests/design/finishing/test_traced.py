@@ -97,7 +97,7 @@ def test_a_lens_is_finished_where_first_order_ends():
 
 
 # number of finishing steps
-@pytest.mark.parametrize("steps", [2, pytest.param(STEPS, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("steps", [1, pytest.param(STEPS, marks=pytest.mark.slow)])
 def test_final_quality_makes_lenses_whose_traced_ghosts_are_nearer(monkeypatch, steps):
     monkeypatch.setattr("flarewright.design.finishing.traced_polish.STEPS", steps)
     ghost_targets = (GhostTarget(ghost="2-1", height=1.2),)

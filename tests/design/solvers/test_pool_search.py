@@ -12,6 +12,7 @@ from flarewright.design.finishing.candidate import outcomes
 from flarewright.design.problem.ghosts import evaluate
 from flarewright.design.problem.prescription import Structure, glass_patterns, structures, surfaces_for
 from flarewright.design.problem.target import problem_of
+from flarewright.design.solvers import pool_search
 from flarewright.design.solvers.polish import polish, polish_within
 from flarewright.design.solvers.pool_search import PoolState, advance, neighbour, propose, solve
 from flarewright.design.solvers.search_state import read_state, write_state
@@ -72,7 +73,7 @@ def test_bounds_are_never_broken(seed):
 
 def test_proposals_stay_what_they_are_called():
     problem, _, _ = planted()
-    state = solve(problem, seed=0, time_limit=None, most_searches=400)
+    state = solve(problem, seed=0, time_limit=None, most_searches=1)
     random = np.random.default_rng(0)
     for run in state.runs:
         for _ in range(50):
@@ -124,12 +125,15 @@ def test_extra_ghosts_cost_by_their_visible_part(entrance, some_hidden):
     assert (~shown).any() == some_hidden
 
 
-def test_threads_and_interruptions_do_not_change_the_result(tmp_path):
+def test_threads_and_interruptions_do_not_change_the_result(tmp_path, monkeypatch):
+    # short rounds, and proposals from pools soon
+    monkeypatch.setattr(pool_search, "batch_size", lambda _: 4)
+    monkeypatch.setattr(pool_search, "FIRST", 8)
     problem, _, _ = planted()
-    whole = solve(problem, seed=5, time_limit=None, most_searches=640, threads=1)
-    half = solve(problem, seed=5, time_limit=None, threads=4, most_searches=320)
+    whole = solve(problem, seed=5, time_limit=None, most_searches=128, threads=1)
+    half = solve(problem, seed=5, time_limit=None, threads=4, most_searches=64)
     write_state(half, tmp_path / "search.json")
-    resumed = solve(problem, time_limit=None, most_searches=640, threads=3, state=read_state(tmp_path / "search.json"))
+    resumed = solve(problem, time_limit=None, most_searches=128, threads=3, state=read_state(tmp_path / "search.json"))
     assert whole.searches == resumed.searches
     assert whole.next_run == resumed.next_run
     for one, other in zip(whole.runs, resumed.runs, strict=True):
@@ -163,7 +167,7 @@ def test_different_seeds_search_differently():
 
 def test_lenses_are_distinct_and_valid():
     problem, _, _ = planted()
-    state = solve(problem, seed=2, time_limit=None, most_searches=500)
+    state = solve(problem, seed=2, time_limit=None, most_searches=200)
     found = outcomes(state, problem, count=4)
     assert len(found) >= 2
     for one in found:

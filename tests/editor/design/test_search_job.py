@@ -12,6 +12,7 @@ from PIL import Image
 
 from flarewright.design.coatings.color_search import solve_colors
 from flarewright.design.coatings.colors import color_problem, own_colors, perceived_differences
+from flarewright.design.solvers import pool_search
 from flarewright.design.solvers.pool_search import PoolState, solve
 from flarewright.editor.design import search_job
 from flarewright.editor.design.kept_search import kept_search, read_kept
@@ -91,6 +92,7 @@ def test_a_search_that_gets_ready_is_stopped_at_once(project, monkeypatch):
 def test_a_search_of_an_ended_editor_resumes(project, monkeypatch):
     """Its end is that of a search without interruption: the same rounds, whatever the number of editors."""
     rounds = 3
+    monkeypatch.setattr(pool_search, "batch_size", lambda _: 4)
     monkeypatch.setattr(search_job, "compile_kernels", lambda picture: None)
     monkeypatch.setattr(search_job, "outcomes", lambda *_, **__: ())
     monkeypatch.setattr(search_job, "obstacles", lambda *_, **__: ())
@@ -267,6 +269,8 @@ def test_coatings_are_shown_as_they_will_be_once_they_are_taken(project, chosen,
     monkeypatch.setattr(render_picture, "WIDEST", max(render_picture.WIDEST, 480))
     monkeypatch.setattr(render_picture, "HIGHEST", max(render_picture.HIGHEST, 270))
     shot = project.replace(design=Design(ghost_targets=(GhostTarget(ghost="8-6", color=(1.0, 0.2, 0.1)),)))
+    # a draft differs by its other ghosts
+    shot = shot.replace(quality=shot.quality.replace(paths="all"))
     view = View(exposure_stops=chosen, look=look)
     reported = []
     session = _Session(shot)
