@@ -421,6 +421,7 @@ def test_ghosts_json_is_the_promised_contract(capsys, folder):
 
 def test_ghosts_csv_has_the_numbers_of_the_json(capsys):
     stopped = ("ghosts", "heliar-tronnier", "--light", "10,0", "--fstop", "8", "--coating", "none", "--brightest", "5")
+    stopped += ("--paths", "same-side")
     data = call_json(capsys, *stopped)
     assert run([*stopped, "--csv"]) == 0
     rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
@@ -438,7 +439,7 @@ def test_ghosts_csv_has_the_numbers_of_the_json(capsys):
 
 def test_ghosts_of_a_near_light(capsys):
     """Far away it is distant; near, the front covers its solid angle."""
-    arguments = ("ghosts", "heliar-tronnier", "--light", "4,3", "--fstop", "8")
+    arguments = ("ghosts", "heliar-tronnier", "--light", "4,3", "--fstop", "8", "--paths", "same-side")
     distant, far, near = (call_json(capsys, *arguments, "--distance", distance) for distance in ("inf", "1e9", "300"))
     for table in (distant, far, near):
         table["ghosts"].sort(key=lambda row: (row["first_reflection"], row["second_reflection"]))
@@ -461,10 +462,11 @@ def test_ghosts_prints_the_veiling_glare(capsys, monkeypatch):
     from flarewright.optics.scattering import dust
     from flarewright.render.scattering import veiling_glare
 
-    # tests the printed output, not its accuracy (test_veiling_glare): few angles, few dust sizes
+    # tests the printed output, not its accuracy (test_veiling_glare): few angles, few and small dust sizes
     monkeypatch.setattr(veiling_glare, "INNER_NODES", 2)
     monkeypatch.setattr(veiling_glare, "OUTER_NODES", 4)
     monkeypatch.setattr(dust, "SIZES", 12)
+    monkeypatch.setattr(dust, "LARGEST", 100.0)
     monkeypatch.setattr(dust, "PER_ANGLE", 1)
     monkeypatch.setattr(dust, "_mie_spread", cache(dust._mie_spread.__wrapped__))
     words = ["ghosts", "triplet-pestrecov", "--light", "5,0", "--fstop", "8", "--brightest", "1", "--glare"]

@@ -61,7 +61,7 @@ OTHER = Structure(4, (True, True, True, False, False, True, False))
 def test_other_structures_have_the_ghosts_too(monkeypatch, others):
     problem, solved = free_planted(signed=False)
     if others:
-        monkeypatch.setattr(null_space, "SEARCHES", 700)
+        monkeypatch.setattr(null_space, "SEARCHES", 1000)
         assert {solved.structure, *others} < set(problem.structures)
         problem = replace(problem, structures=(solved.structure, *others))
     found = same_ghosts(problem, solved, seed=1)
