@@ -88,11 +88,11 @@ def count(shot: Shot, path: LightPath, iris: Iris, *, w: int = 0, n: int = 240) 
     """Trace n x 2n rays over the accepted part of the pupil, both halves, and add the flux that passes.
 
     A coarse grid over the whole pupil finds that part. The error of the fine grid is its ragged border, below 2e-4 of
-    the flux.
+    the flux for 240 rays and 7e-4 for 120.
     """
     packed, tilt = shot.packed, shot.incidence.tilt
     box = front_box(packed, tilt)
-    for fineness in (100, n):
+    for fineness in (min(100, n // 2), n):
         points, cell, size = _grid(box, fineness)
         data = trace_points(packed, w, path, tilt, points)
         alive = (data[:, 4] > 0) & (data[:, 3] <= 1.0)

@@ -33,22 +33,24 @@ def monochrome(project) -> np.ndarray:
     return shot.weights(shot.packed.wavelengths_nm)[0]
 
 
-def counted(project, rays: int | None = None) -> dict:
+def counted(project, rays: int | None = None, every: int = 1) -> dict:
     """Count rays for every path; 170 per side give the flux of plain ghosts to 4e-4, 120 to 7e-4."""
     # thin rings need more
-    rays = rays or (240 if project.lens == "double-gauss-tronnier" else 170)
+    rays = rays or {"double-gauss-tronnier": 240, "tessar-brendel": 170}.get(project.lens, 120)
     camera = project.camera.replace(size_px=(64, 36))
     lit = project.replace(camera=camera, quality=Quality(wavelengths=1), output=Output())
-    return _counted(lit.model_dump_json(), rays)
+    return _counted(lit.model_dump_json(), rays, every)
 
 
 @lru_cache(maxsize=16)
-def _counted(json: str, rays: int) -> dict:
+def _counted(json: str, rays: int, every: int) -> dict:
     """Count once per light and sensor, for any number of pixels."""
     project = Project.model_validate_json(json)
     shot = shots_of(project)[0]
     lens = load_lens(project.lens)
-    return {f"ghost.{path.name}": count(shot, path, project.iris, n=rays) for path in ghost_paths(lens)}
+    return {
+        f"ghost.{path.name}": count(shot, path, project.iris, n=rays) for path in ghost_paths(lens)[every > 1 :: every]
+    }
 
 
 def complaints(project, truth: dict, floor: float = FLOOR, tolerance: float = FLUX) -> list[str]:
@@ -78,14 +80,16 @@ def slow(*values):
 # --- the sum of each layer
 
 
-@pytest.mark.parametrize("lens", ["heliar-tronnier", slow("tessar-brendel"), slow("double-gauss-tronnier")])
+@pytest.mark.parametrize(
+    "lens", ["triplet-pestrecov", slow("heliar-tronnier"), slow("tessar-brendel"), slow("double-gauss-tronnier")]
+)
 def test_each_layer_holds_its_flux_whatever_the_picture(lens):
     """A sensor that contains all, one of 36 mm and a square one; small, odd and ordinary sizes; two tolerances."""
     wide = ghosts_of(lens, mono((8.0, 5.0)), size_px=(64, 36), sensor_mm=HOLDS)
     truth = counted(wide)
     assert all(c.on_sensor == pytest.approx(c.flux, rel=1e-3) for c in truth.values() if c.flux > 0.0)
     assert complaints(wide, truth) == []
-    for size, tolerance in (((320, 180), 0.25), ((333, 187), 0.05), ((127, 255), 1.0)):
+    for size, tolerance in (((161, 91), 0.05), ((127, 255), 1.0)):
         same = ghosts_of(lens, mono((8.0, 5.0)), size_px=size, sensor_mm=HOLDS, tolerance_px=tolerance)
         assert complaints(same, truth) == [], (size, tolerance)
 
@@ -93,7 +97,8 @@ def test_each_layer_holds_its_flux_whatever_the_picture(lens):
 @pytest.mark.parametrize(
     ("lens", "size", "sensor"),
     [
-        ("tessar-brendel", (333, 187), (36.0, 20.25)),
+        ("triplet-pestrecov", (333, 187), (36.0, 20.25)),
+        slow("tessar-brendel", (333, 187), (36.0, 20.25)),
         slow("tessar-brendel", (101, 99), (100.0, 40.0)),
         slow("heliar-tronnier", (333, 187), (36.0, 20.25)),
         slow("double-gauss-tronnier", (333, 187), (36.0, 20.25)),
@@ -130,21 +135,21 @@ def test_every_edge_is_cut_exactly(lens, iris, f_number, field, size, sensor):
 
 
 @pytest.mark.parametrize(
-    ("lens", "field", "f_number", "rays"),
+    ("lens", "field", "f_number", "rays", "every"),
     [
-        slow("flektogon-35", (10.0, 5.0), 2.8, 120),
-        slow("takumar-50-f1.4", (8.0, 5.0), 1.4, 90),
-        # one of its ghosts is a ring so thin that few rays do not determine its flux
-        ("double-gauss-tronnier", (0.0, 0.0), 2.1, 170),
-        slow("flektogon-35", (10.0, 5.0), 2.8, 240),
-        slow("takumar-50-f1.4", (8.0, 5.0), 1.4, 240),
-        slow("double-gauss-tronnier", (0.0, 0.0), 2.1, 240),
+        slow("flektogon-35", (10.0, 5.0), 2.8, 120, 1),
+        slow("takumar-50-f1.4", (8.0, 5.0), 1.4, 90, 1),
+        # one of its ghosts is a ring so thin that few rays do not determine its flux; it is among every fourth
+        ("double-gauss-tronnier", (0.0, 0.0), 2.1, 170, 4),
+        slow("flektogon-35", (10.0, 5.0), 2.8, 240, 1),
+        slow("takumar-50-f1.4", (8.0, 5.0), 1.4, 240, 1),
+        slow("double-gauss-tronnier", (0.0, 0.0), 2.1, 240, 1),
     ],
 )
-def test_light_beside_rays_that_end_is_drawn(lens, field, f_number, rays):
+def test_light_beside_rays_that_end_is_drawn(lens, field, f_number, rays, every):
     """Ghosts bounded by rays that miss a surface, before which T falls steeply, instead of by an edge."""
-    project = ghosts_of(lens, mono(field), f_number=f_number, size_px=(240, 160), sensor_mm=HOLDS)
-    assert complaints(project, counted(project, rays)) == []
+    project = ghosts_of(lens, mono(field), f_number=f_number, size_px=(120, 80), sensor_mm=HOLDS)
+    assert complaints(project, counted(project, rays, every)) == []
 
 
 @pytest.mark.parametrize(
@@ -170,7 +175,7 @@ def test_layers_agree_with_the_ghost_table(lens, field, f_number):
 @pytest.mark.parametrize("lens", ["heliar-tronnier", slow("tessar-brendel")])
 def test_the_pass_holds_all_ghosts(lens, mode):
     """Drawn together, with faint ghosts at lower resolution, or one by one."""
-    project = scene(lens, mono((8.0, 5.0)), layers=mode, starburst=False, size_px=(320, 180), sensor_mm=(72.0, 40.5))
+    project = scene(lens, mono((8.0, 5.0)), layers=mode, starburst=False, size_px=(160, 90), sensor_mm=(72.0, 40.5))
     drawn = layer_flux(layers_of(project)["ghosts"], project) / monochrome(project)
     truth = counted(project)
     np.testing.assert_allclose(drawn, sum(c.on_sensor for c in truth.values()), rtol=FLUX)
@@ -190,7 +195,7 @@ def test_colours_hold_the_flux_of_every_wavelength(bridge, waves):
     coating = Everywhere(coating=QuarterWave(center_wavelength_nm=550.0))
     project = scene(
         "tessar-brendel", Light(field_deg=(8.0, 5.0), spectrum=D65()), layers="ghosts", starburst=False,
-        size_px=(400, 400), sensor_mm=(200.0, 200.0), wavelengths=waves, bridge=bridge, coating=coating,
+        size_px=(200, 200), sensor_mm=(200.0, 200.0), wavelengths=waves, bridge=bridge, coating=coating,
     )  # fmt: skip
     layers = layers_of(project)
     every = project.quality.replace(wavelengths=21 if bridge else waves, bridge=False)
@@ -199,7 +204,7 @@ def test_colours_hold_the_flux_of_every_wavelength(bridge, waves):
     for name in ("ghost.7-6", "ghost.4-2", "ghost.2-0"):
         path = path_of(project, name)
         # with many wavelengths each needs less accuracy than with five
-        rays = 90 if bridge else 170
+        rays = 60 if bridge else 120
         flux = np.array([count(shot, path, project.iris, w=w, n=rays).on_sensor for w in range(len(weights))])
         expected = flux @ weights
         error = np.abs(layer_flux(layers[name], project) - expected)
@@ -216,7 +221,7 @@ def test_few_wavelengths_tell_the_colours_of_single_films(mode, limit):
     found = {}
     for waves, bridge in ((31, False), (7, False), (7, True)):
         project = scene(
-            "tessar-brendel", Light(field_deg=(5.0, 0.0), spectrum=D65()), wavelengths=waves, bridge=bridge,
+            "triplet-pestrecov", Light(field_deg=(5.0, 0.0), spectrum=D65()), wavelengths=waves, bridge=bridge,
             coating=film, **parts,
         )  # fmt: skip
         found[waves, bridge] = layer_flux(layers_of(project)["ghosts"], project)
@@ -240,7 +245,7 @@ def test_the_brightest_get_layers_of_their_own(mode):
 # --- cropping
 
 
-@pytest.mark.parametrize("lens", ["heliar-tronnier", "canon-28-80"])
+@pytest.mark.parametrize("lens", ["heliar-tronnier", slow("canon-28-80")])
 def test_a_smaller_sensor_is_a_crop_of_a_larger_one(lens):
     parts = {"layers": "passes", "starburst": False, "paths": "same-side"}
     big = scene(lens, mono((8.0, 5.0)), size_px=(256, 144), sensor_mm=(64.0, 36.0), **parts)
@@ -276,7 +281,7 @@ def test_tiles_of_the_sensor_add_up_to_the_whole():
 # --- resolution
 
 
-@pytest.mark.parametrize("lens", ["heliar-tronnier", "tessar-brendel"])
+@pytest.mark.parametrize("lens", ["heliar-tronnier", slow("tessar-brendel")])
 def test_a_fine_picture_averaged_is_the_coarse_one(lens):
     """On average (L1) within 0.5 %; away from caustics and edges, where a block is uniform, pixel for pixel."""
     fine = scene(lens, mono((8.0, 5.0)), layers="ghosts", starburst=False, size_px=(512, 288))
@@ -301,7 +306,7 @@ def test_threads_do_not_change_a_byte(mode, layers):
     lights = (Light(field_deg=(8.0, 5.0)), Light(field_deg=(-3.0, 9.0), intensity=0.3))
     # one of the four has a starburst too
     shown = {"layers": layers, "starburst": (mode, layers) == ("draft", "passes")}
-    project = scene("heliar-tronnier", *lights, iris=SIX, mode=mode, size_px=(96, 54), wavelengths=3, **shown)
+    project = scene("triplet-pestrecov", *lights, iris=SIX, mode=mode, size_px=(96, 54), wavelengths=3, **shown)
     one, five = (render(project, threads=n).layers for n in (1, 5))
     for a, b in zip(one, five, strict=True):
         assert a.name == b.name
@@ -319,7 +324,7 @@ def beauty_of(lens: str, field, size=(160, 90), **parts):
 
 
 @pytest.mark.parametrize("mode", ["draft", "final"])
-@pytest.mark.parametrize("lens", ["heliar-tronnier", "double-gauss-tronnier"])
+@pytest.mark.parametrize("lens", ["heliar-tronnier", slow("double-gauss-tronnier")])
 def test_mirrored_light_makes_the_mirrored_picture(lens, mode):
     parts = {"mode": mode, "f_number": 5.6}
     a = beauty_of(lens, (8.0, 5.0), **parts)
@@ -341,7 +346,8 @@ def test_a_quarter_turn_of_the_light_turns_the_picture(mode):
 @pytest.mark.parametrize("mode", ["draft", "final"])
 def test_blades_turn_with_the_picture(mode):
     """Four blades are the same after a quarter turn; six equal six rotated by 30 degrees."""
-    parts = {"sensor_mm": (30.0, 30.0), "mode": mode}
+    # both qualities have the same starburst
+    parts = {"sensor_mm": (30.0, 30.0), "mode": mode, "starburst": mode == "draft"}
     a = beauty_of("heliar-tronnier", (8.0, 5.0), (96, 96), iris=SIX, **parts)
     b = beauty_of("heliar-tronnier", (-5.0, 8.0), (96, 96), iris=Iris(blades=6, rotation_deg=90.0), **parts)
     assert np.abs(np.rot90(a) - b).sum() < 1e-4 * np.abs(a).sum()
@@ -365,7 +371,7 @@ def test_intensity_scales_everything(mode):
 def test_two_lights_are_the_sum_of_two_renders(mode):
     a, b = Light(field_deg=(8.0, 5.0)), Light(field_deg=(-4.0, 6.0), intensity=0.5, spectrum=D_LINE)
     parts = {"layers": "ghosts", "mode": mode, "size_px": (160, 90), "wavelengths": 3}
-    together, alone_a, alone_b = (layers_of(scene("tessar-brendel", *who, **parts)) for who in ((a, b), (a,), (b,)))
+    together, alone_a, alone_b = (layers_of(scene("triplet-pestrecov", *who, **parts)) for who in ((a, b), (a,), (b,)))
     for name in together:
         parts_of_it = [picture(x[name], (160, 90)) for x in (alone_a, alone_b) if name in x]
         whole = picture(together[name], (160, 90))
@@ -389,8 +395,15 @@ def test_the_f_number_sets_the_light():
     assert found[16.0] == pytest.approx(found[32.0], rel=1.5e-3)
 
 
-@pytest.mark.parametrize("iris", [ROUND, SIX])
-@pytest.mark.parametrize("lens", ["heliar-tronnier", "double-gauss-tronnier"])
+@pytest.mark.parametrize(
+    ("lens", "iris"),
+    [
+        ("heliar-tronnier", ROUND),
+        ("double-gauss-tronnier", SIX),
+        slow("heliar-tronnier", SIX),
+        slow("double-gauss-tronnier", ROUND),
+    ],
+)
 def test_the_starburst_holds_the_direct_flux(lens, iris):
     """The starburst's pixels add up to the rays counted on the direct path, if the sensor contains it."""
     project = scene(
@@ -421,7 +434,7 @@ def test_draft_tends_to_exact_rays_near_the_axis():
         }  # fmt: skip
         field = (4.0 * shrink, 3.0 * shrink)
         project = scene("heliar-tronnier", mono(field), mode="draft", **parts)
-        draft, rgb, truth = layers_of(project), monochrome(project), counted(project, 120)
+        draft, rgb, truth = layers_of(project), monochrome(project), counted(project, 90)
         # surfaces other than the first always bound some ghosts; these are bounded by the iris
         big = [name for name, c in truth.items() if c.flux > 0.05 * max(c.flux for c in truth.values())]
         assert len(big) >= 10
@@ -474,7 +487,7 @@ def test_a_half_black_mask_halves_the_light(tmp_path, mode):
     pytest.importorskip("PIL")
     whole = write_mask(tmp_path / "white.png", np.ones((64, 64)))
     half = write_mask(tmp_path / "half.png", np.repeat([[1.0], [0.0]], 32, axis=0) * np.ones((64, 64)))
-    parts = {"layers": "ghosts", "starburst": False, "mode": mode, "size_px": (200, 200), "sensor_mm": HOLDS}
+    parts = {"layers": "ghosts", "starburst": False, "mode": mode, "size_px": (100, 100), "sensor_mm": HOLDS}
     a, b = (layers_of(scene("heliar-tronnier", mono((0.0, 0.0)), iris=iris, **parts)) for iris in (whole, half))
     one_crossing = {"ghost.1-0", "ghost.2-0", "ghost.4-1", "ghost.8-6", "ghost.8-7"}
     for name in one_crossing & set(a):
@@ -486,13 +499,14 @@ def test_a_mask_darkens_the_direct_image_by_its_own_mean(tmp_path):
     grey = write_mask(tmp_path / "disc.png", disc(512))
     flux = []
     for iris in (ROUND, grey):
-        summary = render(scene("heliar-tronnier", mono((0.0, 0.0)), iris=iris, size_px=(16, 9), mode="draft")).summary
+        # the pattern of an image takes long, and the direct image's light does not depend on it
+        lit = scene("heliar-tronnier", mono((0.0, 0.0)), iris=iris, size_px=(16, 9), mode="draft", starburst=False)
+        summary = render(lit).summary
         flux.append(summary["lights"][0]["direct_throughput_mm2"][0])
     assert flux[1] == pytest.approx(flux[0], rel=3e-3)
 
 
-@pytest.mark.parametrize("mode", ["draft", "final"])
-@pytest.mark.parametrize("turn", [90.0, 30.0])
+@pytest.mark.parametrize(("turn", "mode"), [(30.0, "draft"), (30.0, "final"), slow(90.0, "draft"), slow(90.0, "final")])
 def test_a_turned_mask_is_a_mask_of_the_turned_image(tmp_path, mode, turn):
     """Ghosts rotate with the image, as the starburst does."""
     pytest.importorskip("PIL")
@@ -538,7 +552,7 @@ def test_a_path_that_passes_the_picture_by_is_no_light_in_it():
         region = find_region(shot.packed, path, shot.incidence.tilt, shot.opening.radius, shot.view_radius)
         if region is not None and region.seen_flux == 0.0:
             far += 1
-            assert count(shot, path, project.iris).on_sensor == 0.0
+            assert count(shot, path, project.iris, n=100).on_sensor == 0.0
     assert far > 0
     assert replace(shot, size_px=(64, 36)).view_radius == pytest.approx(np.hypot(4.0, 2.25))
 
@@ -547,11 +561,12 @@ def test_a_black_picture_has_a_remark():
     lit, dark = (
         render(
             Project(
-                lens="tessar-brendel",
+                lens="triplet-pestrecov",
                 f_number=16.0,
                 lights=(Light(field_deg=(8.0, 4.0), intensity=value),),
                 camera={"size_px": (48, 27)},
                 quality={"wavelengths": 1, "ringing": "off", "paths": "same-side"},
+                output=Output(starburst=False),
             )
         )
         for value in (1.0, 0.0)

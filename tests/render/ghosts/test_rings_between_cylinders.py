@@ -75,7 +75,7 @@ def along(lens, axis, path, order, packed, sharp, pixel):
     ("ghost", "size_px", "sensor_mm", "tabled", "part"),
     [
         # behind the cylinders
-        ("10-8", (280, 280), (24.0, 24.0), True, 0.12),
+        pytest.param("10-8", (280, 280), (24.0, 24.0), True, 0.12, marks=pytest.mark.slow),
         # between them: L with one sign in both meridians, similar and not, and with both signs
         pytest.param("8-3", (240, 240), (24.0, 28.0), False, 0.25, marks=pytest.mark.slow),
         pytest.param("6-3", (100, 300), (3.2, 12.0), False, 0.25, marks=pytest.mark.slow),
