@@ -60,7 +60,7 @@ def _small_batches():
 
 @pytest.fixture(scope="module")
 def eight(_small_batches):
-    return render(project(reference_samples=8 * BATCH, lights=LIGHTS), ledger=True)
+    return render(project(reference_samples=8 * BATCH, lights=LIGHTS), ledger=True, threads=1)
 
 
 def test_layers(eight):
@@ -75,9 +75,8 @@ def test_layers(eight):
     assert 0.0 < facts["share_of_four_and_more_reflections"] < 0.2
 
 
-@pytest.mark.parametrize("threads", [1, 3])
-def test_pixels_do_not_depend_on_threads(eight, threads):
-    same(eight, render(project(reference_samples=8 * BATCH, lights=LIGHTS), threads=threads))
+def test_pixels_do_not_depend_on_threads(eight):
+    same(eight, render(project(reference_samples=8 * BATCH, lights=LIGHTS), threads=3))
 
 
 def test_resumed_is_the_same_bit_for_bit(eight, tmp_path):
@@ -117,9 +116,7 @@ def test_a_full_disk_costs_the_state_and_not_the_picture(eight, tmp_path, monkey
 
 
 def test_another_seed_gives_other_rays_of_the_same_light():
-    one, other = (
-        render(project(reference_samples=LEAST_BATCHES * BATCH, seed=seed), ledger=True) for seed in (0, 2**60 + 1)
-    )
+    one, other = (render(project(reference_samples=LEAST_BATCHES * BATCH, seed=seed)) for seed in (0, 2**60 + 1))
     assert (layer(one, "ghosts") != layer(other, "ghosts")).any()
     a, b = (r.summary["reference"] for r in (one, other))
     noise = np.hypot(a["relative_standard_error"], b["relative_standard_error"])
@@ -129,10 +126,10 @@ def test_another_seed_gives_other_rays_of_the_same_light():
 def test_stops_at_the_wanted_error():
     loose, strict = (
         render(project(reference_samples=None, reference_error=e, reference_error_of=of)).summary["reference"]
-        for e, of in ((0.5, "total"), (0.05, "blocks"))
+        for e, of in ((0.5, "total"), (0.1, "blocks"))
     )
     assert (loose["batches"], loose["stopped_by"]) == (LEAST_BATCHES, "error")
-    assert strict["relative_standard_error_of_blocks"] <= 0.05
+    assert strict["relative_standard_error_of_blocks"] <= 0.1
     assert strict["stopped_by"] == "error"
 
 
@@ -144,7 +141,7 @@ def test_stops_when_the_time_is_over():
 
 def test_variance_is_that_of_repeated_renders():
     """The scatter of 12 seeds equals the predicted error: chi-squared over pixels."""
-    many = [render(project(wavelengths=1, reference_samples=16 * BATCH, seed=seed)) for seed in range(12)]
+    many = [render(project(wavelengths=1, reference_samples=8 * BATCH, seed=seed)) for seed in range(12)]
     means = np.array([layer(r, "ghosts")[..., 1] for r in many], dtype=np.float64)
     reported = np.mean([layer(r, "ghosts.variance")[..., 1] for r in many], axis=0)
     lit = reported > np.quantile(reported, 0.2)
@@ -227,7 +224,8 @@ def test_a_fine_coating_sends_no_ray_around_for_ever(monkeypatch):
     """The same with few rays, in this process."""
     monkeypatch.setattr(ledger_pass, "SIDE", 24)
     # a ledger ignores the starburst, which is slow on pixels this large
-    exec(BROADBAND.replace("wavelengths=3", "wavelengths=1").replace("size_px=(16, 9)", "size_px=(96, 54)"), {})
+    small = BROADBAND.replace("wavelengths=3", "wavelengths=1").replace("size_px=(16, 9)", "size_px=(96, 54)")
+    exec(small.replace('("heliar-tronnier", "double-gauss-tronnier")', '("double-gauss-tronnier",)'), {})
 
 
 @pytest.mark.slow
@@ -237,8 +235,8 @@ def test_oblique_rays_through_fine_coatings_do_not_breed_without_end():
 
 
 @pytest.mark.parametrize("mode", ["final", "reference"])
-def test_ledger_sums_to_one(mode):
-    # the ledger of a final picture has 16 batches of four times the size
+def test_ledger_sums_to_one(mode, monkeypatch):
+    monkeypatch.setattr(ledger_pass, "SIDE", SIDE)
     rendering = render(project(mode=mode, lights=LIGHTS, wavelengths=1 if mode == "final" else 3), ledger=True)
     ledger = rendering.ledger
     assert sum(line.share for line in ledger.lines) == pytest.approx(ledger.total.share, abs=1e-12)

@@ -22,9 +22,9 @@ from flarewright.render.scene.shots import make_shots
 SIZE = (96, 64)
 
 
-def project(*rules, gain=None, limit=1e-3, light=None, **parts):
+def project(*rules, gain=None, limit=1e-3, light=None, lens="triplet-pestrecov", **parts):
     made = scene(
-        "heliar-tronnier", light or mono((8.0, 5.0)), size_px=SIZE, sensor_mm=(150.0, 100.0), layers="ghosts",
+        lens, light or mono((8.0, 5.0)), size_px=SIZE, sensor_mm=(150.0, 100.0), layers="ghosts",
         starburst=False, wavelengths=1, **parts,
     )  # fmt: skip
     quality = made.quality.replace(orders=4, order4_limit=limit)
@@ -66,7 +66,7 @@ def test_steps_of_a_path():
 
 
 def test_the_search_meets_paths_that_exist_and_no_others():
-    settled, found = searched(project())
+    settled, found = searched(project(lens="heliar-tronnier"))
     rows = range(len(settled.lens.rows))
     mirrors = [k for k in rows if k != settled.lens.stop_row]
     possible = {f"{j}-{i}-{k}-{m}" for j, i, k, m in product(mirrors, repeat=4) if i < j and k > i and m < k}
@@ -96,7 +96,7 @@ def test_a_limit_too_low_says_so(monkeypatch):
 
 def test_same_side_paths_stay_on_one_side():
     stop = load_lens("heliar-tronnier").stop_row
-    names = fours_of(render(project(limit=2e-4, paths="same-side")))
+    names = fours_of(render(project(lens="heliar-tronnier", limit=2e-4, paths="same-side")))
     assert names
     for name in names:
         assert len({int(row) < stop for row in name.split("-")}) == 1
@@ -148,7 +148,7 @@ def test_rules_reach_them(plain):
     left = {name for name in names if row not in name.split("-")}
     assert fours_of(render(project(Rule(select=f"row:{row}", enable=False)))) == left
     # only the selected two-reflection ghost remains
-    assert not fours_of(render(project(Rule(select="not 4-1", enable=False))))
+    assert not fours_of(render(project(Rule(select="not 3-1", enable=False))))
     assert fours_of(render(project(Rule(select="brightest:3", gain=0.5)))) == names
     bright = by_name(render(project(Rule(select=some, gain=3.0))))[f"ghost.{some}"]
     np.testing.assert_allclose(bright.pixels, 3.0 * by_name(plain)[f"ghost.{some}"].pixels, rtol=1e-5)
@@ -162,10 +162,10 @@ def test_the_gain_of_the_pass_is_theirs_too(plain):
 @pytest.mark.parametrize("name", ["4-1-2-3", "4-1-1-0", "4-1-20-3", "4-1-5-3", "4-1-3", "4-1-sensor-2"])
 def test_names_of_no_path_are_refused(name):
     with pytest.raises(ProjectError, match=r"has no ghost|the sensor reflects"):
-        render(project(Rule(select=name, gain=2.0)))
+        render(project(Rule(select=name, gain=2.0), lens="heliar-tronnier"))
 
 
 def test_four_reflections_are_named_only_where_there_are_some():
-    two = project(Rule(select="4-1-3-2", gain=2.0))
+    two = project(Rule(select="4-1-3-2", gain=2.0), lens="heliar-tronnier")
     with pytest.raises(ProjectError, match="has no ghost 4-1-3-2"):
         render(two.replace(quality=two.quality.replace(orders=2)))

@@ -104,7 +104,7 @@ def test_where_nothing_blocks_scatter_adds_up_totals():
 
 def test_white_is_what_a_render_says_of_an_extended_scene():
     coating = Everywhere(coating=Standard(name="modern-broadband"))
-    project = Project(lens="double-gauss-tronnier", f_number=8.0, lights=ANYWHERE, coating=coating)
+    project = Project(lens="triplet-pestrecov", f_number=8.0, lights=ANYWHERE, coating=coating)
     reported = veiling_glare(project, NM)
     light = Light(field_deg=(0.0, 0.0), spectrum=Lines(lines=((NM, 1.0),)))
     drawn = render(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from flarewright.model import Art, Camera, Dirt, Iris, Light, Output, Project, Quality, Starburst
+from flarewright.model import Art, Camera, Dirt, Iris, Light, Output, Project, Quality, Rule, Starburst
 from flarewright.optics.diffraction.fraunhofer import Pattern, Soil, pupil_pattern
 from flarewright.optics.pupil.dirt import FIELD, RAGGED, Elements, generate_dirt, rasterise, scattered
 from flarewright.optics.pupil.polygon import closed
@@ -60,7 +60,7 @@ def test_veil_of_random_discs_is_the_transform_of_their_picture():
     rings = [np.nonzero((r > low) & (r < high)) for low, high in ((8, 12), (12, 20), (20, 30), (30, 50))]
     widths = [r[ring] for ring in rings]
     found, expected = np.zeros(len(rings)), np.zeros(len(rings))
-    for seed in range(3):
+    for seed in range(2):
         elements = generate_dirt(Dirt(dust_per_mm2=0.2, dust_um=(150.0, 600.0), seed=seed), 8.0)
         inside = np.hypot(*elements.discs[:, :2].T) < 1.2
         amplitude, _ = rasterise(Elements(elements.discs[inside], elements.arcs), at)
@@ -70,7 +70,7 @@ def test_veil_of_random_discs_is_the_transform_of_their_picture():
         for k, (ring, at_s) in enumerate(zip(rings, widths, strict=True)):
             found[k] += (np.abs(spectrum[ring]) ** 2 * spacing**4 / np.sinc(spacing * at_s) ** 4).mean()
             expected[k] += np.interp(at_s, term.s, term.radial).mean()
-    # speckle: a ring of n grains is known to 1 / sqrt(n), the smallest of three pupils to 2 %
+    # speckle: a ring of n grains is known to 1 / sqrt(n), the smallest of two pupils to 3 %
     np.testing.assert_allclose(found, expected, rtol=0.1)
 
 
@@ -89,15 +89,15 @@ def test_veil_of_random_discs_is_the_transform_of_their_picture():
 )
 def test_unit_flux_whatever_lies_on_the_pupil(name, iris):
     pattern = pupil_pattern(iris, radius_mm=8.0, soil=Soil(SOILS[name]))
-    size, pitch = (451, 451), 0.12
+    size, pitch = (301, 301), 0.18
     E = starburst_layer(
-        iris, 4.0, (pitch, pitch), size, (225.7, 225.2), WAVES, np.ones((len(WAVES), 3)), pattern=pattern
+        iris, 4.0, (pitch, pitch), size, (150.7, 150.2), WAVES[::2], np.ones((len(WAVES[::2]), 3)), pattern=pattern
     )
-    clean = starburst_layer(iris, 4.0, (pitch, pitch), size, (225.7, 225.2), WAVES, np.ones((len(WAVES), 3)))
-    assert E[..., 0].sum(dtype=float) * pitch**2 / len(WAVES) == pytest.approx(1.0, abs=2e-3)
+    clean = starburst_layer(iris, 4.0, (pitch, pitch), size, (150.7, 150.2), WAVES[::2], np.ones((len(WAVES[::2]), 3)))
+    assert E[..., 0].sum(dtype=float) * pitch**2 / len(WAVES[::2]) == pytest.approx(1.0, abs=2e-3)
     assert 0.8 < pattern.transmittance < 0.9999
     # far from the centre there is more light than without dirt
-    assert E[:, :150].sum(dtype=float) > 1.02 * clean[:, :150].sum(dtype=float)
+    assert E[:, :100].sum(dtype=float) > 1.02 * clean[:, :100].sum(dtype=float)
 
 
 def test_parseval_in_the_fourier_core():
@@ -139,7 +139,7 @@ def test_roughness_takes_its_share_of_the_spike_and_keeps_the_flux():
     args = (4.0, (0.04, 0.04), (301, 301), (150.5, 150.5), *GREEN)
     kept = []
     iris = Iris(blades=4, roughness_um=sigma_um, roughness_length_um=100.0)
-    for seed in range(4):
+    for seed in range(3):
         rough = pupil_pattern(iris.replace(roughness_seed=seed), radius_mm=radius)
         kept.append(spike(rough) / spike(pupil_pattern(Iris(blades=4))))
     s = SPIKE_AT
@@ -154,7 +154,7 @@ def test_roughness_takes_its_share_of_the_spike_and_keeps_the_flux():
 def test_the_light_of_rough_edges_goes_where_their_normals_point():
     """Second method: the Fourier transform of drawn rough irises, in a ring, by direction, without the spikes."""
     iris = Iris(blades=4, roughness_um=60.0, roughness_length_um=250.0)
-    patterns = [pupil_pattern(iris.replace(roughness_seed=seed), radius_mm=8.0) for seed in range(4)]
+    patterns = [pupil_pattern(iris.replace(roughness_seed=seed), radius_mm=8.0) for seed in range(3)]
     pattern = patterns[-1]
     cells = len(pattern.table) - 1
     # the lower half: a pattern is symmetric about its centre
@@ -227,6 +227,8 @@ def test_rims_make_a_cats_eye_off_the_axis():
 def picture(name="starburst", **changes):
     given = {
         "lens": "heliar-tronnier", "f_number": 8.0, "lights": (Light(field_deg=(5.0, 2.0)),),
+        # the starburst does not depend on the ghosts
+        "art": Art(rules=() if name == "ghosts" else (Rule(select="all", enable=False),)),
         "camera": Camera(size_px=(150, 100)), "quality": Quality(mode="draft", wavelengths=3, paths="same-side"),
         "output": Output(layers="passes"), **changes,
     }  # fmt: skip
@@ -326,6 +328,8 @@ def test_scratches_of_many_widths_make_no_comb():
     assert len(widths) > 1000
     assert widths.mean() == pytest.approx(40.0, rel=0.03)
     assert widths.max() / widths.min() == pytest.approx(8.0, rel=0.02)
+    # a part of them, for less time
+    arcs = arcs[::3]
     many = scattered(Elements(np.empty((0, 4)), arcs), np.zeros(0, bool), np.ones(len(arcs), bool), math.pi)
     same = arcs.copy()
     same[:, 4] = 5e-3
