@@ -136,8 +136,8 @@ COARSE = 48
 
 
 def test_heliar():
-    """Five of 28 paths; `test_five_lenses` checks all of them at this angle."""
-    some = [None, (1, 0), (4, 1), (7, 0), (8, 6)]
+    """Three of 28 paths; `test_five_lenses` checks all of them at this angle."""
+    some = [(4, 1), (7, 0), (8, 6)]
     compare(HELIAR, 4.5, (8.0, 5.0), paths=some, samples=2000, grid=COARSE)
 
 
@@ -149,7 +149,7 @@ def test_canon_some_paths():
 
 
 @pytest.mark.parametrize(
-    "paths", [[None, (1, 0), (3, 2), (5, 0), (6, 5)], pytest.param(None, marks=pytest.mark.slow)], ids=["some", "all"]
+    "paths", [[None, (3, 2), (5, 0)], pytest.param(None, marks=pytest.mark.slow)], ids=["some", "all"]
 )
 def test_a_shipped_lens(paths):
     """File, loader and table together, against the oracle's reading of the same frozen data."""

@@ -32,7 +32,7 @@ SIZE = (240, 160)
 L_SHAPE = Polygon(corners_deg=((0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)))
 
 
-def project(*lights, lens="heliar-tronnier", f_number=8.0, mode="final", step=2.0, size=SIZE, paths="all", **parts_):
+def project(*lights, lens="triplet-pestrecov", f_number=8.0, mode="final", step=2.0, size=SIZE, paths="all", **parts_):
     return Project(
         lens=lens,
         f_number=f_number,
@@ -88,7 +88,7 @@ SHAPES = {
 def points_image(name):
     """Return the direct image of the points that make up an area light, from a draft, where it is the same."""
     step = {"sun": 0.05, "near lamp": 0.5}.get(name, 0.35)
-    fine = project(*many(light(**SHAPES[name]), step), mode="draft", paths="same-side")
+    fine = project(*many(light(**SHAPES[name]), step), lens="heliar-tronnier", mode="draft", paths="same-side")
     return picture(fine, "starburst")
 
 
@@ -113,9 +113,10 @@ def test_an_area_light_is_the_sum_of_its_points(name, mode, effort):
     extended = light(**SHAPES[name])
     step, paths = (1.0, "all") if effort == "whole" else (2.0, "same-side")
     step *= 0.05 if name == "sun" else 0.35
-    one = project(extended, mode=mode, paths=paths)
+    # a lens with little distortion, which one part of a light does not follow
+    one = project(extended, lens="heliar-tronnier", mode=mode, paths=paths)
     rendering = render(one)
-    fine = project(*many(extended, step), mode=mode, paths=paths, starburst=False)
+    fine = project(*many(extended, step), lens="heliar-tronnier", mode=mode, paths=paths, starburst=False)
     area, points = pictured(rendering, one), picture(fine)
     assert area.sum() == pytest.approx(points.sum(), rel=2e-3)
     assert np.abs(area - points).sum() < 0.02 * points.sum()
@@ -226,14 +227,14 @@ def test_a_single_ghost_is_spread_too():
     singles = [layer for name, layer in layers.items() if name.startswith("ghost.")]
     total = sum(layer.pixels.sum(dtype=np.float64) for layer in singles)
     assert total == pytest.approx(layers["ghosts"].pixels.sum(dtype=np.float64), rel=1e-4)
-    art = {"rules": [{"select": "4-1", "gain": 2.0, "blur_px": 2.0, "ramp": [[0, 1, 1, 1], [2, 1, 1, 1]]}]}
+    art = {"rules": [{"select": "3-1", "gain": 2.0, "blur_px": 2.0, "ramp": [[0, 1, 1, 1], [2, 1, 1, 1]]}]}
     changed = {layer.name: layer for layer in render(made.replace(art=type(made.art).model_validate(art))).layers}
-    before, after = (found["ghost.4-1"].pixels.sum(dtype=np.float64) for found in (layers, changed))
+    before, after = (found["ghost.3-1"].pixels.sum(dtype=np.float64) for found in (layers, changed))
     assert after == pytest.approx(2.0 * before, rel=0.01)
 
 
 def test_the_same_pixels_whatever_the_threads():
-    # 56 ghosts of two parts are drawn in three groups
+    # 30 ghosts of two parts are drawn in groups
     made = project(light(shape=Rectangle(size_deg=(3.5, 1.5))), size=(120, 80))
     assert len(make_shots(resolve_project(made), make_opening(resolve_project(made), None))) == 2
     one, three = (render(made, threads=n) for n in (1, 3))
@@ -366,14 +367,14 @@ def test_a_disc_that_moves_a_ghost_one_way_is_a_line_bright_in_the_middle():
 def test_ghosts_of_an_area_light_that_nobody_sees_may_be_drawn_in_few_colours():
     """Second method: each ghost in full detail, as a separate layer."""
     made = Project(
-        lens="heliar-tronnier", f_number=5.6, lights=(Light(field_deg=(6.0, 4.0), diameter_deg=0.5),),
+        lens="triplet-pestrecov", f_number=5.6, lights=(Light(field_deg=(6.0, 4.0), diameter_deg=0.5),),
         camera=Camera(size_px=(120, 80)), quality=Quality(wavelengths=5, ringing="off"),
         output=Output(starburst=False, layers="ghosts"),
     )  # fmt: skip
     full = render(made)
     few = render(made.replace(output=Output(starburst=False, layers="passes")))
     expected, found = (next(x for x in one.layers if x.name == "ghosts").pixels for one in (full, few))
-    assert sum(layer.name.startswith("ghost.") for layer in full.layers) > 20
+    assert sum(layer.name.startswith("ghost.") for layer in full.layers) > 10
     # in few colours a ghost whose throughput is steep keeps the colour of its traced wavelengths
     assert np.abs(found - expected).mean() < 1.5e-3 * expected.mean()
     assert not np.array_equal(found, expected)

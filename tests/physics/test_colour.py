@@ -67,10 +67,10 @@ SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in MORE]
 ONE_LENS = ["triplet", *(pytest.param(name, marks=pytest.mark.slow) for name in CASES if name != "triplet")]
 
 
-def at_lines(spectrum):
+def at_lines(spectrum, count=61):
     """Return a spectrum as lines, each with the power of the spectrum there."""
-    power = spectral_power(spectrum, LINES_NM)
-    return Lines(lines=tuple(zip(LINES_NM.tolist(), power.tolist(), strict=True)))
+    nm = np.linspace(*VISIBLE_NM, count)
+    return Lines(lines=tuple(zip(nm.tolist(), spectral_power(spectrum, nm).tolist(), strict=True)))
 
 
 @cache
@@ -174,6 +174,8 @@ STEEP = {
 STEEP_FAST = (
     "sliver", "red end", "draft", "draft of bare glass", "draft that bends at one end", "abrupt end of a draft",
 )  # fmt: skip
+# 41 lines show these within 0.3 % of what 61 do, and the films of a long lens cost time at each
+FEWER_LINES = {"sliver": 41, "red end": 41, "draft": 41}
 # nine lines, none of which is among seven traced wavelengths
 FEW_LINES = Lines(lines=tuple((nm, 1.0) for nm in (367.0, 383.0, 402.0, 436.0, 480.0, 546.0, 578.0, 640.0, 700.0)))
 
@@ -205,7 +207,7 @@ def ghost_of(case, spectrum, wavelengths, **quality):
 
 
 def steep_error(case, spectrum, exact_spectrum, **quality):
-    exact = ghost_of(case, exact_spectrum, len(LINES_NM))
+    exact = ghost_of(case, exact_spectrum, len(exact_spectrum.lines))
     found = ghost_of(case, spectrum, 3 if {**STEEP, **HIDDEN, **LAMPS}[case][-1] == "draft" else 7, **quality)
     return np.abs(found - exact).max() / np.abs(exact).max()
 
@@ -223,7 +225,7 @@ WINDOWS_NM = {"hidden draft": (360.0, 410.0), "short draft": (360.0, 410.0)}
     "case", [pytest.param(case, marks=() if case in STEEP_FAST else pytest.mark.slow) for case in STEEP]
 )
 def test_a_ghost_that_passes_at_one_end_of_the_spectrum_has_its_colour(case):
-    assert steep_error(case, D65(), at_lines(D65())) < GHOST
+    assert steep_error(case, D65(), at_lines(D65(), FEWER_LINES.get(case, len(LINES_NM)))) < GHOST
 
 
 @pytest.mark.slow
@@ -255,8 +257,9 @@ LAMP = BlackBody(temperature_k=2856.0)
     ],
 )
 def test_whatever_lights_it(case, spectrum):
-    # 61 lines leave out the light beyond 780 nm
-    assert steep_error(case, spectrum, at_lines(spectrum)) < (1.5 if spectrum is LAMP else 1.0) * GHOST
+    # lines up to there leave out the light beyond 780 nm
+    exact = at_lines(spectrum, FEWER_LINES.get(case, len(LINES_NM)))
+    assert steep_error(case, spectrum, exact) < (1.5 if spectrum is LAMP else 1.0) * GHOST
 
 
 @pytest.mark.parametrize("case", ["sliver", "draft", "draft of bare glass"])
@@ -265,7 +268,7 @@ def test_lines_between_those_traced_light_it_too(case):
 
 
 # a red diode, whose band early multicoats hardly reflect, and a lamp of ten lines
-BAND_NM = np.linspace(605.0, 660.0, 61)
+BAND_NM = np.linspace(605.0, 660.0, 31)
 RED = Tabulated(wavelength_nm=tuple(BAND_NM.tolist()), power=tuple(np.exp2(-(((BAND_NM - 632.0) / 9.0) ** 2)).tolist()))
 MERCURY = Lines(
     lines=tuple(
@@ -277,11 +280,11 @@ MERCURY = Lines(
     )
 )
 # diodes: a blue one, and the blue with the phosphor of a white one
-BLUE_NM = np.linspace(430.0, 466.0, 61)
+BLUE_NM = np.linspace(430.0, 466.0, 25)
 BLUE = Tabulated(
     wavelength_nm=tuple(BLUE_NM.tolist()), power=tuple(np.exp2(-(((BLUE_NM - 448.0) / 7.5) ** 2)).tolist())
 )
-WHITE_NM = np.linspace(400.0, 700.0, 76)
+WHITE_NM = np.linspace(400.0, 700.0, 61)
 WHITE_POWER = np.exp2(-(((WHITE_NM - 452.0) / 10.0) ** 2)) + 0.55 * np.exp2(-(((WHITE_NM - 565.0) / 60.0) ** 2))
 WHITE = Tabulated(wavelength_nm=tuple(WHITE_NM.tolist()), power=tuple(WHITE_POWER.tolist()))
 LAMPS = {
@@ -306,8 +309,8 @@ LAMPS = {
         ("cut by the picture", MERCURY),
         ("films near their zero", BLUE),
         ("other rays at other wavelengths", MERCURY),
-        ("few cells", BLUE),
-        ("begins in a gap", WHITE),
+        pytest.param("few cells", BLUE, marks=pytest.mark.slow),
+        pytest.param("begins in a gap", WHITE, marks=pytest.mark.slow),
     ],
 )
 def test_ghosts_are_right_under_lamps_too(case, spectrum):
@@ -322,7 +325,7 @@ def test_ghosts_are_right_under_lamps_too(case, spectrum):
 
 def test_light_beyond_780_nm_counts():
     """Films reflect much there: with what they reflect at 780 nm, this ghost was 1.9 % off."""
-    nm, embers = np.linspace(360.0, 830.0, 61), BlackBody(temperature_k=2000.0)
+    nm, embers = np.linspace(360.0, 830.0, 41), BlackBody(temperature_k=2000.0)
     exact = Lines(lines=tuple(zip(nm.tolist(), spectral_power(embers, nm).tolist(), strict=True)))
     assert steep_error("far red", embers, exact) < 0.5 * GHOST
 
@@ -334,7 +337,7 @@ def test_all_ghosts_of_a_zoom_have_their_colour(mode, wavelengths):
 
 
 def test_without_bridges_nothing_between_is_looked_at():
-    assert steep_error("sliver", D65(), at_lines(D65()), bridge=False) > 5.0 * GHOST
+    assert steep_error("sliver", D65(), at_lines(D65(), FEWER_LINES["sliver"]), bridge=False) > 5.0 * GHOST
 
 
 def lightness(pixels):
@@ -368,10 +371,13 @@ def z_of(case, seeds, samples):
     return (sums.mean(axis=0) - exact) / error
 
 
-@pytest.mark.parametrize("side", [96, pytest.param(128, marks=pytest.mark.slow)])
-def test_the_reference_agrees_in_every_channel(side, monkeypatch):
+@pytest.mark.parametrize(
+    ("side", "batches", "seeds"),
+    [(48, 4, 7), *(pytest.param(side, 2, 5, marks=pytest.mark.slow) for side in (96, 128))],
+)
+def test_the_reference_agrees_in_every_channel(side, batches, seeds, monkeypatch):
     monkeypatch.setattr(estimator, "SIDE", side)
-    assert np.abs(z_of("triplet", 5, 2 * side**2)).max() < 5.0
+    assert np.abs(z_of("triplet", seeds, batches * side**2)).max() < 5.0
 
 
 @pytest.mark.slow

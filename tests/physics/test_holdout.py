@@ -33,7 +33,7 @@ DISC = Light(field_deg=(6.0, 4.0), spectrum=D_LINE, diameter_deg=3.0)
 
 def project(light=DISC, holdout=None, mode="final", **how):
     return Project(
-        lens="heliar-tronnier",
+        lens="triplet-pestrecov",
         f_number=8.0,
         lights=(light,),
         camera=Camera(size_px=SIZE),

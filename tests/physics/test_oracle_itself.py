@@ -303,7 +303,7 @@ def test_importance_sampling_against_brute_force(path):
 def test_small_regions_are_found():
     """Stopped down to f/128 a ghost's region is 1/1000 of the entrance; flux is proportional to the stop's area."""
     field = (5.0, 2.0)
-    for path in [(8, 6), (4, 3), (2, 0)]:
+    for path in [(8, 6), (2, 0)]:
         assert find_region(system(HELIAR, 128.0), path, field) is not None
         wide, tight = (estimate(system(HELIAR, n), path, field, samples=2000, replicas=4) for n in (64.0, 128.0))
         assert wide is not None
@@ -316,7 +316,7 @@ def test_standard_errors_are_honest():
     s, path, field = system(HELIAR, 4.5), (8, 6), (8.0, 3.0)
     # the search does not depend on the seed
     region = refine(s, path, field, find_region(s, path, field))
-    es = [estimate(s, path, field, samples=1500, replicas=4, seed=k, region=region)[0] for k in range(20)]
+    es = [estimate(s, path, field, samples=600, replicas=4, seed=k, region=region)[0] for k in range(20)]
     for value, error in (("throughput_mm2", "throughput_se"), ("rms_radius_mm", "rms_radius_se")):
         seen = np.std([getattr(e, value) for e in es], ddof=1)
         said = np.sqrt(np.mean([getattr(e, error) ** 2 for e in es]))
@@ -325,12 +325,13 @@ def test_standard_errors_are_honest():
 
 def test_scale_and_mirror_symmetry():
     s = system(TRIPLET, 5.0)
-    a = estimate(s, (6, 2), (9.0, 4.0))[0]
-    b = estimate(s.scaled(2.0), (6, 2), (9.0, 4.0))[0]
+    few = {"samples": 4000, "replicas": 6}
+    a = estimate(s, (6, 2), (9.0, 4.0), **few)[0]
+    b = estimate(s.scaled(2.0), (6, 2), (9.0, 4.0), **few)[0]
     assert b.throughput_mm2 == pytest.approx(4 * a.throughput_mm2, rel=1e-9)
     assert b.centroid_mm == pytest.approx(2 * a.centroid_mm, rel=1e-9)
     assert b.rms_radius_mm == pytest.approx(2 * a.rms_radius_mm, rel=1e-9)
-    c = estimate(s, (6, 2), (-9.0, 4.0))[0]
+    c = estimate(s, (6, 2), (-9.0, 4.0), **few)[0]
     assert c.throughput_mm2 == pytest.approx(a.throughput_mm2, abs=5 * np.hypot(a.throughput_se, c.throughput_se))
     sigma = np.hypot(a.centroid_se, c.centroid_se)
     assert np.all(np.abs(c.centroid_mm * [-1, 1] - a.centroid_mm) < 5 * sigma)

@@ -199,7 +199,7 @@ def test_every_path_of_four_reflections_agrees(fours):
 
 
 def test_a_remark_states_the_missing_four_reflection_flux():
-    project = scene("heliar-tronnier", (10.0, 5.0), 8.0, size=(48, 32))
+    project = scene("triplet-pestrecov", (8.0, 4.0), 8.0, size=(48, 32))
     found = {}
     for limit in (1e-3, 1e-4):
         quality = project.quality.replace(orders=4, order4_limit=limit)

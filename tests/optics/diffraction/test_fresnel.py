@@ -133,13 +133,13 @@ def test_a_grid_as_fine_as_pixels_show_holds_what_pixels_see():
 
 
 def test_edge_of_a_wide_opening_is_the_analytic_knife_edge():
-    grid, found, scale = diffracted(square(RADIUS), 2000.0, RADIUS)
+    grid, found, scale = diffracted(square(RADIUS), 1000.0, RADIUS)
     middle = len(grid.at[1]) // 2
     w = (RADIUS - grid.at[0]) / scale
     s, c = fresnel(w)
     edge = 0.5 * ((c + 0.5) ** 2 + (s + 0.5) ** 2)
     near = (w > -5.0) & (w < 8.0)
-    # ripples of the three other edges: 1 / (pi w) of the wave, w at least 45 scales away
+    # ripples of the three other edges: 1 / (pi w) of the wave, w at least 40 scales away
     ripple = 2.0 * sum(math.sqrt(0.5) / math.pi / (far / scale) for far in (RADIUS, RADIUS, 2.0 * RADIUS))
     row, w = (0.5 * (found[middle] + found[middle - 1]))[::-1], w[::-1]
     near = near[::-1]
@@ -175,14 +175,14 @@ def test_small_fresnel_numbers_tend_to_the_airy_disc():
 
 
 # each opening, and each Fresnel number; large numbers cost most
-PARSEVAL = [(0, 1.5), (1, 1.5), (2, 1.5), (0, 60.0), (1, 5000.0)]
+PARSEVAL = [(0, 1.5), (1, 1.5), (2, 1.5), (0, 60.0), (1, 400.0)]
 
 
 @pytest.mark.parametrize(
     ("iris", "fresnel_number"),
     [
         pytest.param(iris, number, marks=() if (k, number) in PARSEVAL else pytest.mark.slow)
-        for number in (1.5, 60.0, 5000.0)
+        for number in (1.5, 60.0, 400.0, 5000.0)
         for k, iris in enumerate((Iris(), Iris(blades=5, rotation_deg=11), Iris(blades=6, rounding=0.4)))
     ],
 )
@@ -278,7 +278,7 @@ def band(number, width, ratio=1.0, count=41):
 )
 def test_one_transform_holds_the_light_of_a_band(width, ratio, number):
     """Second method: the sum of the intensities of all colours of the band, each by its own FFT."""
-    areas, shares = band(number, width, ratio)
+    areas, shares = band(number, width, ratio, count=21 if number < 400.0 else 41)
     sides = tuple(np.abs(areas).min(axis=0)), tuple(np.abs(areas).max(axis=0))
     grid = fresnel_grid(blades(Iris(blades=3)), RADIUS, RADIUS, *sides)
     found = band_intensity(grid, areas, shares)
@@ -317,7 +317,7 @@ def test_a_part_of_a_pattern_is_cut_out_of_all_of_it(sign):
 
 def test_colours_that_run_alike_are_joined(monkeypatch):
     """Against the sum over colours, for a wide band of a light by the nanometre."""
-    areas, shares = band(500.0, 0.16, count=160)
+    areas, shares = band(200.0, 0.16, count=80)
     opening = blades(Iris(blades=6))
     grid = fresnel_grid(opening, RADIUS, RADIUS, (areas[:, 0].min(),) * 2, (areas[:, 0].max(),) * 2)
     joined = band_intensity(grid, areas, shares)
@@ -327,7 +327,14 @@ def test_colours_that_run_alike_are_joined(monkeypatch):
 
 
 @pytest.mark.parametrize("number", [250.0, pytest.param(500.0, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("window", [((-0.9, 0.5), (-2.3, -1.1)), ((0.6, 2.4), (-0.4, 0.8)), ((0.9, 2.2), (0.2, 2.4))])
+@pytest.mark.parametrize(
+    "window",
+    [
+        ((-0.9, 0.5), (-2.3, -1.1)),
+        pytest.param(((0.6, 2.4), (-0.4, 0.8)), marks=pytest.mark.slow),
+        ((0.9, 2.2), (0.2, 2.4)),
+    ],
+)
 def test_a_window_shows_what_all_of_the_opening_makes_there(window, number):
     """Second method: the whole opening, sampled equally finely; only for white light, which has few fringes."""
     areas, shares = band(number, 0.15)
