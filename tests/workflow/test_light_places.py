@@ -52,13 +52,13 @@ def test_a_track_of_24_frames_lands_within_a_tenth_of_a_pixel_in_each():
 
 def test_the_lens_of_each_frame_places_the_light_of_a_zoom():
     zoom = ProjectCurve(of="zoom", at_s=(0.0, 4 / 24), values=(80.0, 140.0))
-    moved, _ = with_tracks(project("canon-70-200", curves=(zoom,)), [(0, Track("sun", FRAMES[:5], PATH[:5]))])
-    for frame, place in zip(FRAMES[:5], PATH, strict=False):
+    moved, _ = with_tracks(project("canon-70-200", curves=(zoom,)), [(0, Track("sun", FRAMES[:5:2], PATH[:5:2]))])
+    for frame, place in zip(FRAMES[:5:2], PATH[:5:2], strict=True):
         assert np.hypot(*(np.array(shown(moved, frame)) - place)) < 0.1
     resting = project("canon-70-200", curves=(zoom,))
     ((index, track),) = resting_tracks(resting, {0: (500.0, 100.0)})
     held, _ = with_tracks(resting, [(index, track)])
-    assert [shown(held, frame) for frame in (1001, 1003, 1005)] == [pytest.approx((500.0, 100.0), abs=0.05)] * 3
+    assert [shown(held, frame) for frame in (1001, 1004)] == [pytest.approx((500.0, 100.0), abs=0.05)] * 2
     assert resting_tracks(project(), {0: (500.0, 100.0)}) == []
 
 
