@@ -93,8 +93,8 @@ def points_image(name):
 
 
 def late(name, mode, effort):
-    # a concave outline shows the same in final quality, and a disc and a lamp the same as sun and window
-    return effort == "whole" or (mode == "final" and name != "concave") or name in ("sun", "window")
+    # a concave outline shows the same in final quality, and a lamp the same as sun, disc and window
+    return effort == "whole" or (mode == "final" and name != "concave") or name in ("sun", "disc", "window")
 
 
 # half of the paths and a quarter of the points suffice to compare spreads; `test_holdout.py` also tests a disc of
@@ -153,7 +153,7 @@ def test_a_disc_of_no_size_is_a_point():
 def test_shares_go_by_solid_angle():
     wide = light((0.0, 0.0), shape=Rectangle(size_deg=(80.0, 80.0)))
     # so that borders of parts follow the square of half the width
-    pieces = parts(wide, 2.01)
+    pieces = parts(wide, 4.02)
     assert sum(part.share for part in pieces) == pytest.approx(1.0)
     # the solid angle of a square of half width a at distance 1: 4 asin(a^2 / (1 + a^2))
     a = np.tan(np.radians(40.0))

@@ -315,7 +315,7 @@ def test_standard_errors_are_honest():
     """Twenty seeds vary as much as the replicas predict."""
     s, path, field = system(HELIAR, 4.5), (8, 6), (8.0, 3.0)
     # the search does not depend on the seed
-    region = refine(s, path, field, find_region(s, path, field))
+    region = refine(s, path, field, find_region(s, path, field, grid=48))
     es = [estimate(s, path, field, samples=600, replicas=4, seed=k, region=region)[0] for k in range(20)]
     for value, error in (("throughput_mm2", "throughput_se"), ("rms_radius_mm", "rms_radius_se")):
         seen = np.std([getattr(e, value) for e in es], ddof=1)

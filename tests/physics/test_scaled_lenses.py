@@ -109,7 +109,7 @@ def air_spaced(gap: float) -> Lens:
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if k % 3 == 0 else pytest.mark.slow) for k, name in enumerate(NAMES)]
+    "name", [pytest.param(name, marks=() if k % 5 == 0 else pytest.mark.slow) for k, name in enumerate(NAMES)]
 )
 def test_a_scaled_lens_has_the_scaled_first_order_and_rims(name):
     lens = scaled(load_lens(name), 1.0)

@@ -105,7 +105,9 @@ def test_shared_tables_are_the_openings_own_pattern(iris, number, colours, finer
 
 
 @pytest.mark.parametrize(("colours", "finer"), [(9, 3.0), pytest.param(13, 6.0, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("iris", IRISES)
+@pytest.mark.parametrize(
+    "iris", [pytest.param(iris, marks=pytest.mark.slow if k == 2 else ()) for k, iris in enumerate(IRISES)]
+)
 def test_tables_serve_blades_that_are_just_long_enough(iris, colours, finer):
     """Blades of `SHORTEST` scales per half: the fringes of the whole opening are still those of its corners."""
     form = blade_form(blade_edges(iris, RADIUS))

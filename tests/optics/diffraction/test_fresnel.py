@@ -174,15 +174,15 @@ def test_small_fresnel_numbers_tend_to_the_airy_disc():
     assert grid.at[0][ring][np.argmin(row[ring])] == pytest.approx(0.61 * RADIUS / number, rel=0.02)
 
 
-# each opening, and each Fresnel number; large numbers cost most
-PARSEVAL = [(0, 1.5), (1, 1.5), (2, 1.5), (0, 60.0), (1, 400.0)]
+# each opening, and two Fresnel numbers; the knife edge has a large one, which costs most
+PARSEVAL = [(0, 1.5), (1, 1.5), (2, 1.5), (0, 60.0)]
 
 
 @pytest.mark.parametrize(
     ("iris", "fresnel_number"),
     [
         pytest.param(iris, number, marks=() if (k, number) in PARSEVAL else pytest.mark.slow)
-        for number in (1.5, 60.0, 400.0, 5000.0)
+        for number in (1.5, 60.0, 5000.0)
         for k, iris in enumerate((Iris(), Iris(blades=5, rotation_deg=11), Iris(blades=6, rounding=0.4)))
     ],
 )

@@ -97,7 +97,8 @@ def test_a_finer_grid_is_halved_more_often_where_places_bend():
 
 
 SMALL = [
-    "render", "heliar-tronnier", "--light", "8,4", "--size", "32x18", "--wavelengths", "3", "--no-starburst", "--no-png"
+    "render", "triplet-pestrecov", "--light", "8,4", "--size", "32x18", "--wavelengths", "3", "--no-starburst",
+    "--no-png",
 ]  # fmt: skip
 
 

@@ -81,7 +81,11 @@ def test_the_first_command_needs_no_kernel_for_rings(monkeypatch):
 
 @pytest.mark.parametrize(
     ("f_number", "light"),
-    [pytest.param(5.6, (4.0, 3.0), marks=pytest.mark.slow), (8.0, (10.0, 5.0)), (None, (12.0, 7.0))],
+    [
+        pytest.param(5.6, (4.0, 3.0), marks=pytest.mark.slow),
+        (8.0, (10.0, 5.0)),
+        pytest.param(None, (12.0, 7.0), marks=pytest.mark.slow),
+    ],
 )
 def test_rings_that_are_not_drawn_are_invisible(f_number, light, drawn, monkeypatch):
     wanted = project(f_number, lights=(Light(field_deg=light),))

@@ -20,7 +20,9 @@ PROJECT = Project(
     quality=Quality(wavelengths=1, ringing="off"), output=Output(starburst=False),
 )  # fmt: skip
 FOURS = PROJECT.replace(
-    quality=Quality(wavelengths=1, ringing="off", orders=4), lights=POINTS[:1], camera=Camera(size_px=(32, 18))
+    quality=Quality(wavelengths=1, ringing="off", orders=4, order4_limit=5e-3),
+    lights=POINTS[:1],
+    camera=Camera(size_px=(32, 18)),
 )
 CASES = {
     "points": PROJECT.replace(quality=Quality(wavelengths=2)),
