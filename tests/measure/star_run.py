@@ -7,7 +7,11 @@ import numpy as np
 from camera_raw import write_dng
 from synthetic_camera import Setup, expose
 
+from flarewright.model.measurement.capture import CameraNoise
+
 CAMERA = Setup(size_px=(96, 64), exposures_s=(1 / 256, 1 / 8), seed=4)
+# and its levels and noise; without them a merge finds them first
+KNOWN = CameraNoise(black_level=CAMERA.black, white_level=CAMERA.white, electrons_per_unit=3.0, read_noise=4.0)
 HEAD = "file,constellation_deg,exposure_s,iso,f_number,kind\n"
 ANGLES = tuple(float(k) for k in range(4))
 # for tests of what the path of the light alone shows, and of several groups of frames

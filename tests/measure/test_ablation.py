@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from planted_run import FOCAL, LARGEST, SMALL, shape, views, write_small
-from star_run import light_px, shoot, star
+from star_run import KNOWN, light_px, shoot, star
 
 from flarewright.io.measurement.captures import read_captures
 from flarewright.measure.compression.prune import rounded_to_error
@@ -45,9 +45,9 @@ def test_merging_corrects_a_drift_of_at_least_so_many_frames(tmp_path):
     gains = 1.0 + 0.03 * np.random.default_rng(4).normal(size=6)
     scenes = {0.5 * k: star(light_px(0.5 * k)) * np.float32(gain) for k, gain in enumerate(gains)}
     captures = read_captures(shoot(tmp_path, scenes))
-    assert all(frame.gain != 1.0 for frame in merge_captures(captures, tmp_path, tmp_path / "run").frames)
+    assert all(frame.gain != 1.0 for frame in merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN).frames)
     settings = MergeSettings(drift=DriftSettings(least_frames=7))
-    run = merge_captures(captures, tmp_path, tmp_path / "run", settings=settings)
+    run = merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN, settings=settings)
     assert {frame.gain for frame in run.frames} == {1.0}
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from star_run import light_px, shoot, star
+from star_run import KNOWN, light_px, shoot, star
 
 from flarewright.io.measurement.captures import read_captures
 from flarewright.io.measurement.merged import read_frame, read_run, write_frame
@@ -22,7 +22,7 @@ def merged(folder, gains, near=None):
         x, y = np.arange(96) + 0.5 - light_px(angle)[0], np.arange(64)[:, None] + 0.5 - light_px(angle)[1]
         scene[np.hypot(x, y) < 14.0] *= np.float32(gain)
     captures = read_captures(shoot(folder, scenes))
-    return merge_captures(captures, folder, folder / "run"), scenes
+    return merge_captures(captures, folder, folder / "run", camera=KNOWN), scenes
 
 
 def test_what_the_light_does_is_taken_out_and_what_the_lens_does_stays(tmp_path):
@@ -66,6 +66,7 @@ def test_what_changes_near_the_light_alone_is_none_of_the_light(tmp_path):
     assert not any("drifted by" in remark for remark in run.remarks)
 
 
+@pytest.mark.slow
 def test_a_drift_is_found_beside_what_else_changes_near_the_light(tmp_path):
     rng = np.random.default_rng(4)
     planted, ghost = 1.0 + 0.04 * rng.normal(size=(2, len(ANGLES)))

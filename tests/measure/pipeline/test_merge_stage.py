@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from camera_raw import camera_to_rec709
 from measured_run import SETUP, Measured
-from star_run import ANGLES, CAMERA, MANY, light_px, shoot, shoot_raw, star
+from star_run import ANGLES, CAMERA, KNOWN, MANY, light_px, shoot, shoot_raw, star
 from synthetic_camera import expose
 
 from flarewright.errors import FlarewrightError
@@ -19,8 +19,6 @@ from flarewright.measure.merging.settings import MergeSettings
 from flarewright.measure.pipeline.merge_stage import merge_captures, merge_frame
 from flarewright.measure.pipeline.search_images import reference_of
 from flarewright.model.measurement.capture import CameraNoise
-
-KNOWN = CameraNoise(black_level=CAMERA.black, white_level=CAMERA.white, electrons_per_unit=3.0, read_noise=4.0)
 
 
 def test_the_light_is_found_within_a_third_of_a_pixel_though_it_is_clipped(measured: Measured):
@@ -74,17 +72,17 @@ def stamps(folder):
 
 def test_a_stopped_run_resumes_with_the_same_result(tmp_path):
     captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in MANY}))
-    whole = merge_captures(captures, tmp_path, tmp_path / "whole")
+    whole = merge_captures(captures, tmp_path, tmp_path / "whole", camera=KNOWN)
 
     def stop(part, _words):
         if part > 0.5:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        merge_captures(captures, tmp_path, tmp_path / "run", progress=stop, threads=1)
+        merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN, progress=stop, threads=1)
     started = stamps(tmp_path / "run")
     assert 0 < len(started) < len(MANY)
-    again = merge_captures(captures, tmp_path, tmp_path / "run", threads=2)
+    again = merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN, threads=2)
     assert again == whole
     ended = stamps(tmp_path / "run")
     assert started.items() <= ended.items()
@@ -94,10 +92,11 @@ def test_a_stopped_run_resumes_with_the_same_result(tmp_path):
         assert np.array_equal(one.variance, other.variance)
     # another photograph or setting: only its frame is merged again
     np.save(tmp_path / "2-1.npy", np.load(tmp_path / "2-1.npy"))
-    merge_captures(captures, tmp_path, tmp_path / "run")
+    merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN)
     third = stamps(tmp_path / "run")
     assert {name for name, stamp in third.items() if stamp != ended[name]} == {"frame-002.exr"}
-    merge_captures(captures, tmp_path, tmp_path / "run", settings=MergeSettings(white_balance=(2.0, 1.0, 1.5)))
+    balance = MergeSettings(white_balance=(2.0, 1.0, 1.5))
+    merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN, settings=balance)
     assert not stamps(tmp_path / "run").items() & third.items()
 
 
@@ -248,12 +247,12 @@ def test_a_light_that_flickers_and_a_shutter_that_lies_are_put_right(tmp_path):
 def test_a_person_may_point_at_the_light(tmp_path):
     captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle), (80.0, 10.0)) for angle in ANGLES}))
     with pytest.raises(FlarewrightError, match="two lights were found"):
-        merge_captures(captures, tmp_path, tmp_path / "run")
+        merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN)
     pointed = []
     for one in captures:
         x, y = light_px(one.constellation_deg)
         pointed.append(one.replace(light_x_px=x, light_y_px=y))
-    run = merge_captures(pointed, tmp_path, tmp_path / "run")
+    run = merge_captures(pointed, tmp_path, tmp_path / "run", camera=KNOWN)
     assert run.frames[2].light_px == pytest.approx(light_px(2.0))
     assert run.px_per_rad == pytest.approx(400.0, rel=0.01)
 
@@ -568,8 +567,8 @@ def test_upright_frames_are_turned_about_the_axis(tmp_path):
         return x, 31.6 - 0.2 * (x - 40.3)  # seen by a camera tilted by 11 degrees
 
     captures = read_captures(shoot(tmp_path, {angle: star(leaning(angle)) for angle in ANGLES}))
-    plain = merge_captures(captures, tmp_path, tmp_path / "run")
-    run = merge_captures(captures, tmp_path, tmp_path / "run", settings=MergeSettings(upright=True))
+    plain = merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN)
+    run = merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN, settings=MergeSettings(upright=True))
     assert any("turned upright" in remark for remark in run.remarks)
     assert plain.frames[3].horizon_deg > 5.0
     for before, info in zip(plain.frames[2:], run.frames[2:], strict=True):
@@ -587,5 +586,5 @@ def test_upright_frames_are_turned_about_the_axis(tmp_path):
     corner = read_frame(tmp_path / "run", run.frames[0]).variance[0, -1]
     assert np.isinf(corner).all()
     # the original frames are kept and reused
-    again = merge_captures(captures, tmp_path, tmp_path / "run")
+    again = merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN)
     assert again == plain
