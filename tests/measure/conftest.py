@@ -6,10 +6,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from measured_run import SETUP, Measured, Staged
-from planted_run import LARGEST, write_small
+from planted_run import LARGEST, SMALL_GHOSTS, write_small
 from synthetic_camera import make
 
 from flarewright.io.measurement.captures import read_camera, read_captures
+from flarewright.measure.core.parameters import rescaled
 from flarewright.measure.pipeline.merge_stage import merge_captures
 
 
@@ -31,7 +32,8 @@ def staged(tmp_path_factory: pytest.TempPathFactory) -> Staged:
     from flarewright.workflow.measure_run import run_stages
 
     folder, steps, facts = tmp_path_factory.mktemp("staged"), {}, {}
-    write_small(folder, angles=np.linspace(2.0, LARGEST, 4))
+    ghost = rescaled(SMALL_GHOSTS[0], 0.7)
+    write_small(folder, (ghost,), angles=np.linspace(2.0, LARGEST, 4), size=(84, 56))
     done = []
 
     def counted(self, make, real=Journal.step):

@@ -65,7 +65,7 @@ def test_a_purple_ghost_is_found(no_crescents):
     """Coatings optimized for green leave purple ghosts; an earlier version searched green only."""
     ghost = shape(-60.0, 25.0, 0.05)
     seen = []
-    for view in views((), noise=0.012, seed=4, angles=np.linspace(1.0, LARGEST, 6)):
+    for view in views((), noise=0.012, seed=4, angles=np.linspace(1.0, LARGEST, 6), size=(240, 80)):
         light = render(ghost, view)[..., None] * np.array([1.0, 0.1, 1.0])
         seen.append(view.showing((view.pixels + light).astype(np.float32)))
     masks = [np.ones(view.pixels.shape[:2], bool) for view in seen]

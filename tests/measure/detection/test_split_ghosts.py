@@ -1,6 +1,7 @@
 """A ghost whose fit covers two ghosts is split; a ghost that covers one is not."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -32,6 +33,13 @@ def fitted(start: Shape, shown) -> DetectedGhost:
     return DetectedGhost((fit.shape,) * 3, 0, len(shown) - 1, (fit, fit, fit))
 
 
+@cache
+def covering(side: float = 1.0):
+    """Return views of a pair of ghosts, and one ghost fitted to both."""
+    shown = views(pair(side), angles=ANGLES)
+    return shown, fitted(shape(side * 68.0, 15.0, 1.0), shown)
+
+
 def nearest(true: Shape, ghosts, shown) -> float:
     """Return the largest overlap (intersection over union) of a true ghost with the given ones."""
     return max(overlap(true, shape, shown[::2]) for ghost in ghosts for shape in ghost.shapes)
@@ -53,8 +61,7 @@ def test_the_footprint_of_a_shape():
 @pytest.mark.parametrize("side", [1.0, pytest.param(-1.0, marks=pytest.mark.slow)])
 def test_a_ghost_that_covers_two_is_split(side):
     small, large = pair(side)
-    shown = views((small, large), angles=ANGLES)
-    one = fitted(shape(side * 68.0, 15.0, 1.0), shown)
+    shown, one = covering(side)
     assert nearest(small, [one], shown) < 0.5
     reported: list[str] = []
     two = split_ghosts([one], shown, factor=2.0, tell=reported.append)
@@ -82,14 +89,14 @@ def test_two_known_ghosts_are_not_split():
 
 
 def test_a_ghost_removed_by_the_user_is_not_split():
-    shown = views((SMALL, LARGE), angles=ANGLES)
-    one = replace(fitted(shape(68.0, 15.0, 1.0), shown), unwanted=True)
+    shown, one = covering()
+    one = replace(one, unwanted=True)
     assert split_ghosts([one], shown) == [one]
 
 
 def test_a_ghost_before_its_first_fit_keeps_equal_colours():
-    shown = views((SMALL, LARGE), angles=ANGLES)
-    (red, green, blue), first, last = fitted(shape(68.0, 15.0, 1.0), shown).shapes, 0, len(shown) - 1
+    shown, one = covering()
+    (red, green, blue), first, last = one.shapes, 0, len(shown) - 1
     two = split_ghosts([DetectedGhost((red, green, blue), first, last)], shown)
     assert len(two) == 2
     for ghost in two:

@@ -91,9 +91,12 @@ def test_a_light_given_later_is_written_into_the_models(staged, tmp_path):
     assert read_ghost_model(folder / "compact.json").reference.luminance_cd_m2 == 2e6
 
 
-def test_the_residual_is_learned_once(staged, tmp_path):
+def test_the_residual_is_learned_once(staged, tmp_path, monkeypatch):
     """A fit as part of `run` leaves the residual out; `measure fit` adds it, and no later stage becomes outdated."""
     folder, first = copytree(staged.folder, tmp_path / "run"), staged.facts
+    # which residual it is makes no difference here
+    sprites = read_ghost_model(folder / "compact.json").sprites
+    monkeypatch.setattr(learn, "with_residual", lambda model, *_: model.replace(sprites=sprites))
 
     def kept(*some: str) -> list[bool]:
         facts = {each.stage: each for each in run_stages(folder, some)}

@@ -14,8 +14,8 @@ from flarewright.measure.residual.sprite_fit import light_sprites
 from flarewright.model.measurement.ghost_model import AberrationGhost, GhostModel
 from flarewright.model.measurement.sprite import Sprite, encode_pictures
 
-SIZE = (240, 160)
-AXIS = (120.0, 80.0)
+SIZE = (192, 128)
+AXIS = (96.0, 64.0)
 ANGLES = np.linspace(2.0, LARGEST, 10)[3:8]
 # radiance of the picture, and of a ghost over the whole picture that the model draws six times as bright
 TRUE, TAKEN = 0.02, 0.12
@@ -40,7 +40,7 @@ def scene(angle, roll, size=SIZE, axis=AXIS):
     out = np.full((size[1], size[0]), TRUE)
     for px, py, wide in (
         (at[0] - 18.0 * np.cos(turn), at[1] + 18.0 * np.sin(turn), 9.0),
-        (axis[0] - 50.0 * np.cos(turn), axis[1] + 50.0 * np.sin(turn), 12.0),
+        (axis[0] - 40.0 * np.cos(turn), axis[1] + 40.0 * np.sin(turn), 12.0),
     ):
         out += 0.05 * np.exp(-0.5 * ((x - px) ** 2 + (y - py) ** 2) / wide**2)
     return np.repeat(out[..., None], 3, axis=2).astype(np.float32)
@@ -87,26 +87,26 @@ def test_a_rolled_replay_turns_the_true_picture_and_keeps_half_of_the_residual(l
 
 def test_a_taller_picture_shows_the_same_between_its_added_rows(learned):
     wide = replay_model(learned, float(ANGLES[2]))[0].pixels
-    tall = replay_model(learned, float(ANGLES[2]), size_px=(240, 240))[0].pixels
-    np.testing.assert_allclose(tall[40:200], wide, atol=1e-5)
+    tall = replay_model(learned, float(ANGLES[2]), size_px=(192, 192))[0].pixels
+    np.testing.assert_allclose(tall[32:160], wide, atol=1e-5)
 
 
 def test_no_pixel_is_below_0_where_the_residual_exceeds_a_ghost():
     # the residual corrects a ghost that is too bright and ends inside the photographs
-    unit, cells = encode_pictures(np.full((3, 54, 80, 3), TRUE - TAKEN, np.float32), 1e-4)
+    unit, cells = encode_pictures(np.full((3, 44, 64, 3), TRUE - TAKEN, np.float32), 1e-4)
     rest = Sprite(
-        follows="ghosts", grain_px=3.0, corner_px=(-120.0, -81.0), rolls_deg=(0.0, 0.0, 0.0),
-        constellation_deg=(2.0, 12.0, LARGEST), rows=54, columns=80, unit=unit, cells=cells,
+        follows="ghosts", grain_px=3.0, corner_px=(-96.0, -66.0), rolls_deg=(0.0, 0.0, 0.0),
+        constellation_deg=(2.0, 12.0, LARGEST), rows=44, columns=64, unit=unit, cells=cells,
     )  # fmt: skip
     model = GhostModel(
         size_px=SIZE, axis_px=AXIS, focal_px=250.0, largest_deg=LARGEST, constellation_deg=(2.0, LARGEST),
-        ghosts=(flat(TAKEN, 122.0),), sprites=(rest,),
+        ghosts=(flat(TAKEN, 98.0),), sprites=(rest,),
     )  # fmt: skip
     for roll in (0.0, 90.0):
         drawn = replay_model(model, 12.0, roll_deg=roll)[0].pixels
         assert drawn.min() == 0.0
         # half of the residual remains at a roll that was not photographed
-        assert np.isclose(drawn[70:90, 60:180], TRUE if roll == 0.0 else 0.5 * (TRUE + TAKEN), rtol=0.06).all()
+        assert np.isclose(drawn[54:74, 48:144], TRUE if roll == 0.0 else 0.5 * (TRUE + TAKEN), rtol=0.06).all()
 
 
 def test_a_star_keeps_its_orientation_and_all_else_turns():

@@ -1,6 +1,7 @@
 """The report's section about a model's parameters: both kinds of ghosts, bands of their deviations, full tables."""
 
 import re
+from functools import cache
 
 import numpy as np
 import pytest
@@ -27,6 +28,11 @@ def model(uncertainty=BY_ABERRATIONS, of_bezier=BY_BEZIER, curves=CURVES):
     return planted().replace(ghosts=ghosts)
 
 
+@cache
+def whole_section():
+    return curves_section(model(), COLOURS)
+
+
 def charts_of(html):
     return {re.search(r"<title>(.*?)</title>", one)[1]: one for one in re.findall(r"<svg.*?</svg>", html, re.DOTALL)}
 
@@ -38,7 +44,7 @@ def row_of(html, name):
 
 
 def test_both_kinds_of_ghosts_are_drawn_with_a_band_each():
-    charts = charts_of(curves_section(model(), COLOURS))
+    charts = charts_of(whole_section())
     for title, count in (("Place along the light's line", 3), ("Size", 3), ("Brightness of the middle", 3),
                          ("Red's place", 2), ("Blue's place", 2)):  # fmt: skip
         assert charts[title.replace("'", "&#x27;")].count("<polygon") == count
@@ -55,7 +61,7 @@ def test_ghosts_without_a_colour_are_in_the_table_alone():
 
 
 def test_a_bezier_ghosts_row_is_what_its_polynomials_and_their_scatter_say():
-    place, size, red, green, blue, *apart = row_of(curves_section(model(), COLOURS), "2")
+    place, size, red, green, blue, *apart = row_of(whole_section(), "2")
     # in the middle of 5 to 20 degrees every polynomial equals its first coefficient
     assert place == (30.0, 1.5)
     assert size == (9.0, 0.4)
@@ -180,7 +186,7 @@ def test_a_model_of_bezier_ghosts_alone_says_nothing_of_pupils_and_colours():
     assert "off green" not in html
     assert len(row_of(html, "2")) == 5
     assert "Bezier" not in curves_section(planted().replace(ghosts=(mesh,)), COLOURS)
-    both = curves_section(model(), COLOURS)
+    both = whole_section()
     assert "middle of its pupil" in both
     assert "For a Bezier ghost" in both
 

@@ -14,13 +14,15 @@ from flarewright.measure.tracking.frame_fit import measure_together
 from flarewright.model.measurement.ghost_tracks import Step
 
 ANGLES = np.linspace(1.0, LARGEST, 24)
+# a part of the picture that holds all ghosts of these tests
+STRIP = (SIZE[0], 90)
 
 
-def drawn(ghosts, poses, *, noise=NOISE, seed=1, angles=ANGLES):
+def drawn(ghosts, poses, *, noise=NOISE, seed=1, angles=ANGLES, size=STRIP):
     """Return views of ghosts in the poses `poses(number, constellation)`."""
     rng = np.random.default_rng(seed)
     out = []
-    for view in views((), angles=angles):
+    for view in views((), angles=angles, size=size):
         total = np.zeros(view.pixels.shape[:2])
         for g, ghost in enumerate(ghosts):
             pose = poses(g, view.constellation_deg)
