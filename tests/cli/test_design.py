@@ -126,8 +126,8 @@ def test_identify_finds_the_rank_that_trials_found(capsys):
     assert "the brightness of ghosts (bare glass): 23 of 23" in said
 
 
-def test_scratch_and_colors_write_lenses(folder, plain, capsys):
-    words = ["design", "scratch", "--random", "3", "--unsigned", "--searches", "60", "--lenses", "1", "-o", "new"]
+def test_scratch_and_colors_write_lenses(folder, plain, short_rounds, capsys):
+    words = ["design", "scratch", "--random", "3", "--unsigned", "--searches", "32", "--lenses", "1", "-o", "new"]
     assert run([*words, "--json"]) == 0
     assert len(json.loads(capsys.readouterr().out)["lenses"][0]["ghosts"]) == 3
     (folder / "red.toml").write_text(PROJECT.replace("height = 1.001", "color = [1.0, 0.2, 0.1]"))
@@ -234,7 +234,7 @@ class Killed(BaseException):
 
 
 @pytest.fixture
-def rounds(monkeypatch):
+def rounds(short_rounds, monkeypatch):
     """Return a list of callables: the n-th one is called after the n-th round of a search."""
     planned = []
     whole = pool_search._without_stale_runs
@@ -246,9 +246,6 @@ def rounds(monkeypatch):
         return ended
 
     monkeypatch.setattr(pool_search, "_without_stale_runs", after_round)
-    # short rounds, and proposals from pools soon
-    monkeypatch.setattr(pool_search, "batch_size", lambda _: 4)
-    monkeypatch.setattr(pool_search, "FIRST", 8)
     return planned
 
 
@@ -259,14 +256,6 @@ def made(folder):
 
 
 SEARCH = ["--searches", "100", "--lenses", "1", "--time", "600"]
-
-
-@pytest.fixture
-def plain(monkeypatch):
-    """Write no pictures and no page: they follow from the lenses, and take most of the time."""
-    for name, value in (("_draft", None), ("target_pictures", [None]), ("found_pictures", [None]), ("png_bytes", b"")):
-        monkeypatch.setattr(report, name, lambda *_, value=value: value)
-    monkeypatch.setattr(report, "html_page", lambda *_, **__: "")
 
 
 def nothing():

@@ -29,7 +29,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_a_measured_flare_becomes_a_lens_with_these_ghosts(folder, capsys):
+def test_a_measured_flare_becomes_a_lens_with_these_ghosts(folder, plain, capsys):
     words = ["design", "target", "model.json", "-o", "shot.toml", "--light", "10,0", "--light", "0,16"]
     assert run([*words, "--json"]) == 0
     reported = json.loads(capsys.readouterr().out)
