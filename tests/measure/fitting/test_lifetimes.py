@@ -4,7 +4,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from planted_run import GHOSTS, shape, views
+from planted_run import GHOSTS, LARGEST, shape, views
 
 from flarewright.measure.fitting.detected_ghost import DetectedGhost, residual_of
 from flarewright.measure.fitting.ghost_fit import render
@@ -85,7 +85,8 @@ def test_light_outside_the_range_of_a_ghost_is_not_subtracted():
 def test_the_leading_colour_determines_the_range():
     """Blue shows its end; in green equally bright light stays at its position."""
     one = shape(-60.0, 15.0, 0.4)
-    dark, bright = views(()), views((one,))
+    angles = np.linspace(1.0, LARGEST, 12)
+    dark, bright = views((), angles=angles), views((one,), angles=angles)
     seen = [
         view.showing(
             np.stack([off.pixels[..., 0], view.pixels[..., 1], (view if k < 6 else off).pixels[..., 2]], axis=-1)

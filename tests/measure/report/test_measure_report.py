@@ -45,7 +45,7 @@ def test_a_replay_is_laid_on_its_frame_at_both_sides_and_any_roll(tmp_path, caps
     model = planted()
     width, height = model.size_px
     infos = []
-    for k, (angle, roll) in enumerate(((-12.0, 0.0), (6.0, 0.0), (13.0, 70.0), (20.0, 70.0))):
+    for k, (angle, roll) in enumerate(((-12.0, 0.0), (6.0, 0.0), (13.0, 70.0))):
         drawn = replay_model(model, abs(angle), roll_deg=roll if angle > 0.0 else roll + 180.0)[0].pixels
         spread = 0.01 * np.sqrt(np.square(drawn).mean())
         noisy = drawn + np.random.default_rng(k).normal(size=drawn.shape) * spread
@@ -69,7 +69,7 @@ def test_a_replay_is_laid_on_its_frame_at_both_sides_and_any_roll(tmp_path, caps
     text = (tmp_path / "report.html").read_text()
     assert "20000 cd/m², 0.001 sr: 20 lx" in text
     decibels = [float(found) for found in re.findall(r"replayed, (-?[\d.]+) dB<", text)]
-    assert len(decibels) == 4
+    assert len(decibels) == 3
     # only the frames' noise remains; a misplaced ghost would exceed it
     assert min(decibels) > 20.0
     drawn = re.sub(r"base64,[^\"]*", "", text)

@@ -53,7 +53,7 @@ def test_poses_of_overlapping_ghosts_come_back_within_their_errors(seeds):
 
 def test_births_and_deaths_and_their_reasons():
     ghosts = (shape(-60.0, 20.0, 1.0), shape(55.0, 14.0, 0.6), shape(190.0, 12.0, 0.8))
-    few = np.linspace(1.0, LARGEST, 16)
+    few = np.linspace(1.0, LARGEST, 13)
 
     def poses(g, angle):
         fading = np.clip((angle - 6.0) / 2.0, 0.0, 1.0) * np.clip((17.0 - angle) / 2.0, 0.0, 1.0)
