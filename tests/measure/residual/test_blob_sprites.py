@@ -94,6 +94,7 @@ def test_the_outline_of_a_disc_is_where_the_disc_is(run):
     assert np.allclose(at.spread, 0.5 * abs(green.g[0] + green.g[3] * sigma**2), rtol=0.1)
 
 
+@pytest.mark.slow
 def test_a_blob_is_predicted_between_captures(run):
     model, seen = run
     seen, halfway = seen[6:18], BETWEEN[6:17]
