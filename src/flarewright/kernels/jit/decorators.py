@@ -82,7 +82,26 @@ def inner(function: Callable[..., Any], **options: Any) -> Any:
         # without this Numba would jump to machine code that does not exist
         kernel._insert = lambda *_: None
         kernel._compile_for_args = refuse
+        _forget_literals(kernel)
     return kernel
+
+
+def _forget_literals(kernel: Any) -> None:
+    """Compile a kernel once for all integers: Numba would compile it again for each that a caller writes as a literal.
+
+    The caller still passes the number, and LLVM still sees it where the kernel is inlined.
+    """
+    from numba.core import types
+
+    template = kernel.get_call_template
+
+    def plain(one: Any) -> Any:
+        return types.unliteral(one) if isinstance(one, types.IntegerLiteral) else one
+
+    def get_call_template(args: Any, kws: Any) -> Any:
+        return template(tuple(plain(one) for one in args), {name: plain(one) for name, one in kws.items()})
+
+    kernel.get_call_template = get_call_template
 
 
 def borrowing(function: Callable[..., Any]) -> Any:
