@@ -112,7 +112,7 @@ def test_pictures_without_light_and_a_list_without_exposures_are_refused(listed,
     assert "8 of 8 photographs have no exposure_s" in refused(capsys, *command)
     listed.write_text(text)
     rng = np.random.default_rng(3)
-    for path in tmp_path.glob("*.npy"):
+    for path in sorted(tmp_path.glob("*.npy")):
         dark = rng.normal(CAMERA.black, 4.0, (64, 96, 3))
         np.save(path, dark.round().clip(0).astype(np.uint16))
     assert "no light was found" in refused(capsys, *command)

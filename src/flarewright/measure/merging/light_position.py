@@ -34,7 +34,8 @@ class LightSighting:
     flux : float
         Sum over the 15 x 15 pixels around it, a lower bound where pixels are clipped.
     contrast : float
-        Brightest pixel over the frame's median.
+        Brightest pixel over the frame's median, or over the noise of a pixel where that is more: a picture of noise
+        has a median near 0.
     at_border : bool
         Whether the picture's border cuts the star's middle.
     rival_px : tuple of float or None
@@ -86,8 +87,11 @@ def find_light(radiance: Band, variance: Band, settings: LightSettings = LightSe
     reach = radius + settings.rim_px
     at_border = not (reach / 2 < x < width - reach / 2 and reach / 2 < y < height - reach / 2)
     (x, y), error = _symmetric(light, variance.mean(axis=2, dtype=np.float64), clipped, (x, y), reach, settings)
-    median = max(float(np.median(light[~clipped])) if not clipped.all() else 0.0, 1e-30)
-    contrast = float(light.max()) / median
+    known = ~clipped
+    # the mean of three channels
+    noise = float(np.sqrt(np.median(variance[known].mean(axis=1)) / 3.0)) if known.any() else 0.0
+    median = float(np.median(light[known])) if known.any() else 0.0
+    contrast = float(light.max()) / max(median, noise, 1e-30)
     row, column = (min(max(int(value) - 7, 0), side) for value, side in ((y, height), (x, width)))
     flux = float(light[row : row + 15, column : column + 15].sum())
     rival = rivals[0] if rivals else None
