@@ -88,6 +88,35 @@ def pytest_make_collect_report(collector):
         return (yield)
 
 
+# folders whose tests call the same kernels lie together: first those that draw, last those that measure
+ORDER = (
+    "render", "physics", "golden", "predict", "optics", "cli", "workflow", "editor", "bridges", "plates", "jobs",
+    "trust", "io", "contracts", "kernels", "design", "measure",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items):
+    """Sort the tests by `ORDER`; those of other folders come last."""
+    places = {HERE / name: place for place, name in enumerate(ORDER)}
+    items.sort(key=lambda item: min((places[one] for one in item.path.parents if one in places), default=len(ORDER)))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Deal files out from both ends of the order, so that processes compile and load different kernels."""
+    if config.getoption("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class FromBothEnds(LoadFileScheduling):
+        def _assign_work_unit(self, node):
+            if self.nodes.index(node) % 2 == 1:
+                self.workqueue.move_to_end(next(reversed(self.workqueue)), last=False)
+            super()._assign_work_unit(node)
+
+    return FromBothEnds(config, log)
+
+
 def pytest_collection_finish():
     """Exclude the collected tests from garbage collection, at the end of the process as well: they stay until then."""
     gc.freeze()
