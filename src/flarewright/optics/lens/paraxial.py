@@ -75,6 +75,15 @@ def gap_indices(lens: Lens, wavelength_nm: float) -> Floats:
     return np.array(indices)
 
 
+def gap_indices_at(lens: Lens, wavelengths_nm: Floats) -> Floats:
+    """Return `gap_indices` at many wavelengths, shape (W, K + 1)."""
+    indices = [np.ones(len(wavelengths_nm))]
+    for row in lens.rows:
+        behind = indices[-1] if isinstance(row, Stop) else refractive_index(row.medium, wavelengths_nm)
+        indices.append(np.broadcast_to(behind, wavelengths_nm.shape))
+    return np.column_stack(indices)
+
+
 # cached: every frame of a sequence needs the same index
 @lru_cache(maxsize=4096)
 def _index(medium: Medium | None, wavelength_nm: float) -> float:

@@ -9,8 +9,8 @@ import numpy as np
 
 from ...model import Coating, Lens
 from ...model.project.light import Lines, Spectrum
-from ...optics.colour.spectrum import hats
-from ...optics.lens.paraxial import FirstOrder
+from ...optics.colour.spectrum import band_contents, hats
+from ...optics.lens.paraxial import FirstOrder, gap_indices_at
 from ...optics.rays.pack import PackedLens, SensorMirror, pack_lens
 from ...optics.rays.path_reflectance import CURVE_NM, BandCurves, CoatingCurves, band_curves
 from ...typing import Floats, Indices
@@ -18,14 +18,16 @@ from ...typing import Floats, Indices
 # dense where films reflect most and glass disperses most
 FINE_NM = np.array([
     365.0, 375.0, 385.0, 395.0, 405.0, 415.0, 427.5, 442.5, 460.0, 480.0, 500.0, 520.0, 540.0, 560.0, 580.0, 602.5,
-    630.0, 660.0, 690.0, 720.0, 755.0,
+    630.0, 660.0, 690.0, 720.0, 755.0, 800.0,
 ])  # fmt: skip
 # of these, the two at which drafts compare the flux of all ghosts, towards the ends, where films reflect most (about
 # half of the light below 450 nm lies below the first); and what steep ghosts need besides, where films' reflectance
 # changes most
 BEYOND, STEEP = [2, 19], [5, 17, 20]
-# of a light of few lines, how many beyond the traced wavelengths drafts compute at most; closer lines count as one
-MOST_BEYOND, CLOSE_NM = 5, 10.0
+# drafts compare the flux also where this part of X + Y + Z lies beyond, at either end of the light
+END_PART = 2e-4
+# of a light of few lines, how many besides the traced wavelengths drafts compute at most; closer lines count as one
+MOST_BEYOND, CLOSE_NM = 8, 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,16 +67,20 @@ class Between:
         return FINE_NM if self.lines_nm is None else self.lines_nm
 
     def beyond(self, traced_nm: Floats) -> Indices:
-        """Return which of them drafts compute for all ghosts besides those traced: towards the ends of the light."""
+        """Return which of them drafts compute for all ghosts besides those traced.
+
+        Those are `BEYOND` and the ones at the ends of the light, or the lines farthest from all others.
+        """
         if self.lines_nm is None:
-            return np.array(BEYOND)
+            ((wave, share),) = band_contents(self.spectrum, self.fine_nm[[0]])
+            ends = np.interp([END_PART, 1.0 - END_PART], np.cumsum(share), wave)
+            return np.union1d(BEYOND, np.abs(self.fine_nm - ends[:, None]).argmin(axis=1))
+        far = np.abs(self.lines_nm[:, None] - traced_nm).min(axis=1)
         chosen: list[int] = []
-        known = traced_nm.tolist()
-        for k in np.flatnonzero((self.lines_nm < traced_nm[0]) | (self.lines_nm > traced_nm[-1])).tolist():
-            if np.abs(np.array(known) - self.lines_nm[k]).min() > CLOSE_NM and len(chosen) < MOST_BEYOND:
-                chosen.append(k)
-                known.append(float(self.lines_nm[k]))
-        return np.array(chosen, dtype=np.intp)
+        while len(chosen) < MOST_BEYOND and far.max() > CLOSE_NM:
+            chosen.append(int(far.argmax()))
+            far = np.minimum(far, np.abs(self.lines_nm - self.lines_nm[chosen[-1]]))
+        return np.array(sorted(chosen), dtype=np.intp)
 
     @cached_property
     def nearest(self) -> Indices:
@@ -106,8 +112,12 @@ class Between:
 
     @cached_property
     def curve_indices(self) -> Floats:
-        """Indices of the gaps at `CURVE_NM`, shape (L, K + 1): almost linear in 1 / wavelength^2."""
-        return hats(-(CURVE_NM**-2.0), -(self.fine_nm**-2.0)).T @ self.finer[0].n_gap
+        """Indices of the gaps at `CURVE_NM`, shape (L, K + 1).
+
+        Lines between those at `fine_nm` would move the begin of total reflection by 0.1 nm, and a ghost's light by 2 %.
+        """
+        indices = gap_indices_at(self.lens, CURVE_NM)
+        return indices if self.sensor is None else np.column_stack([indices, np.ones(len(CURVE_NM))])
 
 
 # all frames of a sequence share one
