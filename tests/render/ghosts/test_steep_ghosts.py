@@ -83,8 +83,9 @@ def test_the_light_of_a_gap_is_integrated_up_to_its_end(end, power):
     near, far = light_up_to_its_end(end**power, lambda part: (end - part) ** power if part < end else 0.0)
     whole = end ** (power + 1.0) / (power + 1.0)
     moment = end ** (power + 2.0) / ((power + 1.0) * (power + 2.0))
-    assert near + far == pytest.approx(whole, abs=0.02)
-    assert far == pytest.approx(moment, abs=0.02)
+    # half of the last bisection moves the end of a constant, and hardly changes a square root
+    assert near + far == pytest.approx(whole, abs=0.02 if power == 0.0 else 0.002)
+    assert far == pytest.approx(moment, abs=0.02 if power == 0.0 else 0.001)
 
 
 def test_the_ray_of_a_draft_moves_steadily_from_the_middle_of_the_iris_to_that_of_the_entrance():

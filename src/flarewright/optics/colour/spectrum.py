@@ -16,9 +16,10 @@ from .cie1931 import D65_POWER, FIRST_NM, STEP_NM, Y_BAR, cie_1931, cmf_at_1_nm
 from .rgb import xyz_to_rgb_matrix
 from .rgb_to_spectrum import smoothest_reflectance, uplift
 
-VISIBLE_NM = (360.0, 780.0)
-"""Integration range for the colours of coatings; light beyond counts with the ends. The functions begin at 360 nm; of
-X, Y and Z, 4e-6 of daylight and 12e-6 of an incandescent lamp lie beyond 780 nm."""
+VISIBLE_NM = (360.0, 830.0)
+"""Range over which colours are integrated: that of the colour matching functions (CIE 018:2019). Of X, Y and Z, 4e-6 of
+daylight and 12e-6 of an incandescent lamp lie beyond 780 nm, but films reflect so much there that it counts in ghosts
+under a black body of 2000 K."""
 
 _H, _C, _KB = 6.62607015e-34, 299792458.0, 1.380649e-23  # exact SI values
 

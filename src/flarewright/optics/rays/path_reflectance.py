@@ -29,11 +29,9 @@ from .pack import REFLECTANCE_SAMPLES, PackedLens, SensorMirror
 _Surface = tuple[Medium | None, Medium | None, tuple[float, ...], tuple[float, ...]]
 
 CURVE_NM = np.concatenate([
-    np.arange(VISIBLE_NM[0], 700.0, 2.5), np.arange(700.0, VISIBLE_NM[1], 5.0),
-    [VISIBLE_NM[1], 785.0, 790.0, 795.0, 802.5, 810.0, 820.0, 830.0],
+    np.arange(VISIBLE_NM[0], 700.0, 2.5), np.arange(700.0, 795.0, 5.0), [795.0, 802.5, 810.0, 820.0, VISIBLE_NM[1]],
 ])  # fmt: skip
-"""Integration wavelengths for colours of coatings: dense where the eye sees much, up to the end of the colour matching
-functions, because films reflect so much beyond `VISIBLE_NM` that its light counts under a black body of 2000 K."""
+"""Integration wavelengths for colours of coatings: dense where the eye sees much."""
 
 COSINES = 65
 """Samples of a curve over the cosine of incidence; a line between them errs by 6e-5 of R at most up to 60 degrees."""

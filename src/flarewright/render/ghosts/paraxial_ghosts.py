@@ -51,7 +51,7 @@ CRITICAL = 0.8
 # an offset larger than the distance of any ghost from the picture, pixels
 FAR_PX = 10**7
 # straight edges of the round entrance for comparing fluxes
-ENTRANCE_SIDES = 12
+ENTRANCE_SIDES = 16
 
 
 def draw_draft(

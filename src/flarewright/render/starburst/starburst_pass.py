@@ -30,6 +30,8 @@ from .spectrum_basis import basis_spectra
 
 # Hullin 2011, section 3.3: fine enough to average out the rings of single wavelengths
 DIFFRACTION_STEP_NM = 5.0
+# no film makes more of the light beyond than its 12e-6 of X, Y and Z under an incandescent lamp
+LAST_NM = 780.0
 # rotated and scaled copies that make up the spiral smear of art direction
 SPIRAL_COPIES = 9
 # a direct image with a larger defocus disc is drawn out of focus
@@ -305,7 +307,7 @@ def _patterns(scene: _Scene, shot: Shot, turns: Floats) -> list[Pattern | None]:
 
 
 def _diffracted_wavelengths(shot: Shot) -> Floats:
-    """Return wavelengths in steps of 5 nm over the visible range, or the lines of a line spectrum."""
+    """Return wavelengths in steps of 5 nm up to `LAST_NM`, or the lines of a line spectrum."""
     if isinstance(shot.light.spectrum, Lines):
         return np.array(sorted({nm for nm, _ in shot.light.spectrum.lines}))
-    return np.arange(VISIBLE_NM[0], VISIBLE_NM[1] + 1.0, DIFFRACTION_STEP_NM)
+    return np.arange(VISIBLE_NM[0], LAST_NM + 1.0, DIFFRACTION_STEP_NM)
