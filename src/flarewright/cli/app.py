@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
+from mmap import mmap
 from typing import Annotated, Any
 
 import typer
@@ -332,10 +333,11 @@ def _lacks_memory(error: BaseException | None) -> bool:
 
 
 def _memory_is_used_up() -> bool:
-    """Return whether this process gets no more memory than what the start of a command needs."""
+    """Return whether the system gives this process no more memory than what the start of a command needs."""
     try:
-        bytearray(_SPARE_BYTES)
-    except MemoryError:
+        # not from what the process has freed
+        mmap(-1, _SPARE_BYTES).close()
+    except (MemoryError, OSError):
         return True
     return False
 
