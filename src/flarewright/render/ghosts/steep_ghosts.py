@@ -247,7 +247,8 @@ def steep_paths(
     passed = np.ones(len(CURVE_NM)) if spectra is None else spectra.passed
     drawn = np.isin(known_nm, shot.packed.wavelengths_nm)
     error, total = interpolation_error(passed, seen_light(shot), known_nm, throughput, drawn)
-    seen = total > FAINT_PART * total.max(initial=0.0)
+    # most of a ghost's light may be the error
+    seen = np.maximum(total, error) > FAINT_PART * total.max(initial=0.0)
     # a ghost that is dark at one of these wavelengths ends within the spectrum
     ended = throughput.min(axis=1) < DARK_PART * throughput.max(axis=1)
     much = seen & (error > np.where(ended, DRAFT_COLOR_ERROR, LARGE_ERROR) * total)

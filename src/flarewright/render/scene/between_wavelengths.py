@@ -24,10 +24,11 @@ FINE_NM = np.array([
 # half of the light below 450 nm lies below the first); and what steep ghosts need besides, where films' reflectance
 # changes most
 BEYOND, STEEP = [2, 19], [5, 17, 20]
-# drafts compare the flux also where this part of X + Y + Z lies beyond, at either end of the light
-END_PART = 2e-4
+# drafts compare the flux also where this part of X + Y + Z lies beyond, at either end of the light, if that is not near
+# `BEYOND`: a spline overshoots between unequal gaps
+END_PART, FAR_NM = 2e-4, 25.0
 # of a light of few lines, how many besides the traced wavelengths drafts compute at most; closer lines count as one
-MOST_BEYOND, CLOSE_NM = 8, 10.0
+MOST_BEYOND, CLOSE_NM = 9, 2.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,9 @@ class Between:
         if self.lines_nm is None:
             ((wave, share),) = band_contents(self.spectrum, self.fine_nm[[0]])
             ends = np.interp([END_PART, 1.0 - END_PART], np.cumsum(share), wave)
-            return np.union1d(BEYOND, np.abs(self.fine_nm - ends[:, None]).argmin(axis=1))
+            near = np.abs(self.fine_nm - ends[:, None]).argmin(axis=1)
+            away = np.abs(self.fine_nm[near, None] - self.fine_nm[BEYOND]).min(axis=1) > FAR_NM
+            return np.union1d(BEYOND, near[away])
         far = np.abs(self.lines_nm[:, None] - traced_nm).min(axis=1)
         chosen: list[int] = []
         while len(chosen) < MOST_BEYOND and far.max() > CLOSE_NM:
