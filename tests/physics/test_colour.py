@@ -328,8 +328,8 @@ LAMPS = {
         pytest.param("begins in a gap", WHITE, marks=pytest.mark.slow),
         ("bent over the angle", D65()),
         pytest.param("line in the dark", SODIUM, marks=pytest.mark.slow),
-        ("end by the last digits", BLUE),
-        ("embers", BlackBody(temperature_k=2000.0)),
+        pytest.param("end by the last digits", BLUE, marks=pytest.mark.slow),
+        pytest.param("embers", BlackBody(temperature_k=2000.0), marks=pytest.mark.slow),
     ],
 )
 def test_ghosts_are_right_under_lamps_too(case, spectrum):
