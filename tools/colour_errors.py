@@ -78,7 +78,7 @@ BROADBAND, EARLY, SINGLE = (
     Everywhere(coating=Standard(name=name)) for name in ("modern-broadband", "early-multicoat", "single-1950s")
 )
 STAGGERED = Preset(name="staggered")
-# the method was chosen on the first three lists
+# the method was chosen on the first four lists
 SCENES: dict[str, tuple[Scene, ...]] = {
     "known": (
         ("flektogon-35", BROADBAND, (10.0, 5.0), 8.0),
@@ -105,7 +105,7 @@ SCENES: dict[str, tuple[Scene, ...]] = {
         ("canon-70-200-wide", quarter(500.0), (-6.0, 8.0), 8.0),
         ("angenieux-50-f1.1", STAGGERED, (8.0, -3.0), 2.8),
     ),
-    # these and the fourth were written down before any of them was looked at
+    # these, the fourth and the fifth were written down before any of them was looked at
     "new": (
         ("canon-70-200-tele", BROADBAND, (-2.0, 3.5), 4.0),
         ("canon-70-200-wide", EARLY, (-13.0, 2.0), 5.6),
@@ -133,6 +133,20 @@ SCENES: dict[str, tuple[Scene, ...]] = {
         ("takumar-50-f1.4", EARLY, (12.0, -3.0), 2.0),
         ("angenieux-50-f1.1", EARLY, (-7.0, 6.0), 2.0),
         ("biotar-50-f1.4", quarter(520.0), (-5.0, 10.0), 2.8),
+    ),
+    "fifth": (
+        ("canon-70-200-wide", STAGGERED, (7.0, -9.0), 5.6),
+        ("canon-70-200-tele", EARLY, (4.0, 0.5), 8.0),
+        ("canon-28-80", BROADBAND, (-16.0, -5.0), 4.0),
+        ("nikon-28-75", STAGGERED, (9.0, 9.0), 4.0),
+        ("fisheye-nikkor-10.5", quarter(530.0), (-15.0, 25.0), 5.6),
+        ("nikkor-85-f1.4", STAGGERED, (-8.0, -4.0), 4.0),
+        ("nikkor-180-ed", quarter(480.0), (2.0, 3.5), 2.8),
+        ("speed-panchro-50", EARLY, (12.0, -7.0), 5.6),
+        ("petzval-kodak", EARLY, (-6.0, 2.0), 4.0),
+        ("takumar-50-f1.4", quarter(560.0), (-5.0, -12.0), 4.0),
+        ("angenieux-50-f1.1", quarter(510.0), (10.0, 2.0), 4.0),
+        ("tessar-brendel", EARLY, (14.0, 8.0), 5.6),
     ),
 }
 
