@@ -31,6 +31,8 @@ from ..scene.shot import Shot, seen_light
 
 # lowest expected colour error for a correction, relative to the ghost's largest channel
 COLOR_ERROR, DRAFT_COLOR_ERROR = 0.009, 0.0077
+# the same for a draft that is dark at a wavelength: it begins like a square root, of which a spline sees a part
+ENDED_COLOR_ERROR = 0.004
 # above this error a few wavelengths do not suffice for the colour correction
 LARGE_ERROR = 0.02
 # above this error a gap between fine wavelengths is resolved
@@ -251,7 +253,7 @@ def steep_paths(
     seen = np.maximum(total, error) > FAINT_PART * total.max(initial=0.0)
     # a ghost that is dark at one of these wavelengths ends within the spectrum
     ended = throughput.min(axis=1) < DARK_PART * throughput.max(axis=1)
-    much = seen & (error > np.where(ended, DRAFT_COLOR_ERROR, LARGE_ERROR) * total)
+    much = seen & (error > np.where(ended, ENDED_COLOR_ERROR, LARGE_ERROR) * total)
     return np.flatnonzero(seen & ~much & (error > DRAFT_COLOR_ERROR * total)), np.flatnonzero(much)
 
 
