@@ -111,8 +111,13 @@ class Tab:
         # the page's Content-Security-Policy forbids scripts from text, so the browser cannot wait for one by itself
         end = time.monotonic() + timeout_s
         while not self.js(f"Promise.resolve({expression}).then(Boolean)"):
-            assert time.monotonic() < end, expression
+            assert time.monotonic() < end, f"{expression}; the page said {self.said} and has {self.summary()}"
             self.page.wait_for_timeout(15)
+
+    def summary(self):
+        """Return what the page shows besides the picture, for the message of a failed wait."""
+        return self.js("[window.flarewright?.state?.finding, document.getElementById('panel')?.innerText, "
+                       "document.getElementById('toasts')?.innerText].map((one) => JSON.stringify(one)).join(' ')")  # fmt: skip
 
     def rest(self):
         """Wait until the final picture is shown and the ghosts are measured."""

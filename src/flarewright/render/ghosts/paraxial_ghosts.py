@@ -18,15 +18,14 @@ from ...kernels.paraxial.arguments import EntranceLight, MeridianLens, PathList,
 from ...kernels.paraxial.ghosts import RIM, draw_matrix_ghosts, measure_matrix_ghosts
 from ...kernels.raster.edge_blur import spread_marks
 from ...kernels.raster.polygons import sum_rows
-from ...kernels.tracing.sequential import REFRACT
+from ...kernels.tracing.sequential import REFLECT, REFRACT
 from ...optics.colour.rgb import luminance_weights
 from ...optics.colour.spectrum import hats
 from ...optics.lens.paths import LightPath
 from ...optics.rays.path_reflectance import CURVE_NM, BandCurves, PathSpectrum, joined_steps, products_between
-from ...typing import Floats, Indices
+from ...typing import Floats, Indices, Mask
 from ..image.canvas import DETAIL_CONTRAST, DETAILS, Plane, merge
 from ..scene.art_rules import PathArt
-from ..scene.between_wavelengths import STEEP
 from ..scene.paraxial_place import ghost_frame
 from ..scene.shot import Shot, at_fine_wavelengths
 from .art_filters import coarseness, filtered_ghost
@@ -46,7 +45,7 @@ from .steep_ghosts import (
 
 # rounding error of sums of differences, relative to the largest value
 ROUNDING = 1e-12
-# squared sine above which transmittance changes fast with the angle; 1 is total reflection
+# squared sine above which transmittance and reflectance change fast with the angle; 1 is total reflection
 CRITICAL = 0.8
 # an offset larger than the distance of any ghost from the picture, pixels
 FAR_PX = 10**7
@@ -122,7 +121,7 @@ def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
     throughput = flux if spectra is None else over(flux, spectra.carried)
     carried = _carried(bands, paths, squares, more, near)
     known_nm, known = _merged((packed.wavelengths_nm, throughput), (fine_nm[near], over(beyond, carried)))
-    little, much_steep = steep_paths(shot, known_nm, known, spectra)
+    little, much_steep = steep_paths(shot, known_nm, known, spectra, _nearly_total(paths, angles))
     if between.lines_nm is not None:
         little, much_steep = little[:0], np.union1d(little, much_steep)
     for chosen, much in ((little, False), (much_steep, True)):
@@ -130,7 +129,7 @@ def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
             continue
         few = [paths[int(k)] for k in chosen]
         steps = _steps_of(paths, chosen)
-        waves = np.arange(len(fine_nm)) if much else np.array(STEEP)
+        waves = np.arange(len(fine_nm)) if much else between.steep
         # how much of a sliver lands in the picture depends on the polygon: take the one that is drawn
         sides = RIM if much else ENTRANCE_SIDES
         steep, more = matrix_fluxes(shot, few, fine.n_gap[waves], fine.reflectance, waves, sides)
@@ -346,6 +345,14 @@ def _transmitted(paths: Sequence[LightPath], angles: Floats) -> Floats:
     for p in np.flatnonzero(most[len(angles) // 2] > CRITICAL).tolist():
         squares[starts[p] : starts[p + 1]] = angles[least[p], starts[p] : starts[p + 1]]
     return squares
+
+
+def _nearly_total(paths: Sequence[LightPath], angles: Floats) -> Mask:
+    """Return which paths have a mirror near total reflection, where R is no parabola in the angle; (W, steps)."""
+    _, actions, starts = joined_steps(tuple(paths))
+    mirrors = np.where((actions == REFLECT) & (angles < 1.0), angles, 0.0).max(axis=0)
+    near: Mask = np.maximum.reduceat(mirrors, starts[:-1]) > CRITICAL
+    return near
 
 
 def matrix_fluxes(

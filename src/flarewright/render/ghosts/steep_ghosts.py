@@ -227,7 +227,7 @@ def _lagrange(nodes: tuple[float, ...], places: tuple[float, ...]) -> Floats:
 
 
 def steep_paths(
-    shot: Shot, known_nm: Floats, throughput: Floats, spectra: PathSpectrum | None
+    shot: Shot, known_nm: Floats, throughput: Floats, spectra: PathSpectrum | None, abrupt: Mask | bool = False
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Select the paths whose colours are wrong because their throughput is steep between the traced wavelengths.
 
@@ -240,6 +240,8 @@ def steep_paths(
         Flux there over what rays carry.
     spectra : PathSpectrum or None
         Of all paths.
+    abrupt : ndarray, shape (P,), bool, or bool
+        Paths whose mirrors change fast with the angle: they are steep.
 
     Returns
     -------
@@ -253,7 +255,7 @@ def steep_paths(
     seen = np.maximum(total, error) > FAINT_PART * total.max(initial=0.0)
     # a ghost that is dark at one of these wavelengths ends within the spectrum
     ended = throughput.min(axis=1) < DARK_PART * throughput.max(axis=1)
-    much = seen & (error > np.where(ended, ENDED_COLOR_ERROR, LARGE_ERROR) * total)
+    much = seen & (abrupt | (error > np.where(ended, ENDED_COLOR_ERROR, LARGE_ERROR) * total))
     return np.flatnonzero(seen & ~much & (error > DRAFT_COLOR_ERROR * total)), np.flatnonzero(much)
 
 

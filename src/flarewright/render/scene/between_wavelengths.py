@@ -27,6 +27,8 @@ BEYOND, STEEP = [2, 19], [5, 17, 20]
 # drafts compare the flux also where this part of X + Y + Z lies beyond, at either end of the light, if that is not near
 # `BEYOND`: a spline overshoots between unequal gaps
 END_PART, FAR_NM = 2e-4, 25.0
+# of such a light, where drafts compute the flux of steep ghosts
+INNER_PART = 0.05
 # of a light of few lines, how many besides the traced wavelengths drafts compute at most; closer lines count as one
 MOST_BEYOND, CLOSE_NM = 9, 2.5
 
@@ -73,17 +75,27 @@ class Between:
         Those are `BEYOND` and the ones at the ends of the light, or the lines farthest from all others.
         """
         if self.lines_nm is None:
-            ((wave, share),) = band_contents(self.spectrum, self.fine_nm[[0]])
-            ends = np.interp([END_PART, 1.0 - END_PART], np.cumsum(share), wave)
-            near = np.abs(self.fine_nm - ends[:, None]).argmin(axis=1)
-            away = np.abs(self.fine_nm[near, None] - self.fine_nm[BEYOND]).min(axis=1) > FAR_NM
-            return np.union1d(BEYOND, near[away])
+            return np.union1d(BEYOND, self._ends(END_PART))
         far = np.abs(self.lines_nm[:, None] - traced_nm).min(axis=1)
         chosen: list[int] = []
         while len(chosen) < MOST_BEYOND and far.max() > CLOSE_NM:
             chosen.append(int(far.argmax()))
             far = np.minimum(far, np.abs(self.lines_nm - self.lines_nm[chosen[-1]]))
         return np.array(sorted(chosen), dtype=np.intp)
+
+    @cached_property
+    def steep(self) -> Indices:
+        """Which of them drafts compute for steep ghosts besides those of `beyond`."""
+        inner = self._ends(INNER_PART) if len(self._ends(END_PART)) > 0 else np.zeros(0, np.intp)
+        return np.union1d(STEEP, inner)
+
+    def _ends(self, part: float) -> Indices:
+        """Return which of them lie where this part of X + Y + Z is beyond, at either end, unless near `BEYOND`."""
+        ((wave, share),) = band_contents(self.spectrum, self.fine_nm[[0]])
+        ends = np.interp([part, 1.0 - part], np.cumsum(share), wave)
+        near = np.abs(self.fine_nm - ends[:, None]).argmin(axis=1)
+        away: Indices = near[np.abs(self.fine_nm[near, None] - self.fine_nm[BEYOND]).min(axis=1) > FAR_NM]
+        return away
 
     @cached_property
     def nearest(self) -> Indices:
