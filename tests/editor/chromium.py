@@ -116,8 +116,8 @@ class Tab:
 
     def summary(self):
         """Return what the page shows besides the picture, for the message of a failed wait."""
-        return self.js("[window.flarewright?.state?.finding, document.getElementById('panel')?.innerText, "
-                       "document.getElementById('toasts')?.innerText].map((one) => JSON.stringify(one)).join(' ')")  # fmt: skip
+        words = "['panel', 'toasts'].map((id) => document.getElementById(id)?.innerText)"
+        return self.js(f"JSON.stringify([window.flarewright?.state?.finding, {words}])")
 
     def rest(self):
         """Wait until the final picture is shown and the ghosts are measured."""

@@ -8,7 +8,7 @@ import typer
 
 from ..common import console, print_json
 
-EPILOG = "Use one with: flarewright render heliar-tronnier --light 10,5 --coating modern-broadband -o flare.exr"
+EPILOG = "Use one with: flarewright render takumar-50-f1.4 --light -9,5 --coating modern-broadband -o flare.exr"
 
 
 def listing(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False) -> None:

@@ -69,7 +69,9 @@ def add(
             print(f"{record.name}: {record.title}, {record.file}")
             for remark in record.remarks:
                 print(f"  - {remark}")
-        for one in found.refused[:_LISTED] if found.added or len(found.refused) > 1 else ():
+        # a single one is the error below
+        alone = len(found.refused) == 1 and not found.added and not found.known
+        for one in () if alone else found.refused[:_LISTED]:
             reason = one.reason if Path(one.file).name in one.reason else f"{one.file}: {one.reason}"
             print(f"flarewright: refused: {reason}", file=sys.stderr)
         if len(found.refused) > _LISTED:

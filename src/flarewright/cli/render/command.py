@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ...render.render import Rendering
 
 EPILOG = (
-    "Examples:\n\nflarewright render heliar-tronnier --light 10,5 -o flare.exr\n\n"
+    "Examples:\n\nflarewright render takumar-50-f1.4 --light -9,5 -o flare.exr\n\n"
     "flarewright render canon-28-80 --light -8,3 --light 2,6 --intensity 1 --intensity 0.2 --spectrum black-body:3200 "
     "--fstop 8 --blades 7 --coating quarter-wave:550 --size 1920x1080 --layers ghosts --brightest 30 "
     "-o shot.exr\n\n"

@@ -90,8 +90,10 @@ def film_data(film: FilmResult) -> dict[str, Any]:
 
 def film_words(film: FilmResult) -> str:
     """Return a sentence about a film."""
+    from ...io.files.sentences import count
+
     width, height = film.size_px
     return (
-        f"wrote {film.file}: {len(film.frames)} frames of {width}x{height}, {float(film.fps):.6g} a second, "
+        f"wrote {film.file}: {count(len(film.frames), 'frame')} of {width}x{height}, {float(film.fps):.6g} a second, "
         f"{film.codec}; {film.view}"
     )

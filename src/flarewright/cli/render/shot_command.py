@@ -99,9 +99,11 @@ def shot(options: ShotOptions) -> None:
             }
         )
     else:
+        from ...io.files.sentences import count
+
         kept = len(result.frames) - drawn
-        words = [f"wrote {drawn} frames in {seconds:.1f} s"] if drawn else []
-        words += [f"kept {kept} frames that the same settings made"] if kept else []
+        words = [f"wrote {count(drawn, 'frame')} in {seconds:.1f} s"] if drawn else []
+        words += [f"kept {count(kept, 'frame')} that the same settings made"] if kept else []
         print_remarks([", ".join(words) or "no frame was to be drawn"])
         if result.movie is not None:
             print_remarks([film_words(result.movie)])

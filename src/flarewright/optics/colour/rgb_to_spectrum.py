@@ -63,8 +63,8 @@ def uplift(rgb: tuple[float, float, float]) -> tuple[float, float, float]:
     Notes
     -----
     Newton's method on the three coefficients, from grey. White is a flat curve. The round trip to Rec.709 has an error
-    below 3e-4 of the brightest channel, primaries included. That is the difference between the D65 table and the white of
-    Rec.709, which is rounded (tests/optics/colour/test_rgb_to_spectrum.py).
+    below 3e-4 of the brightest channel, primaries included. That is the difference between the D65 table and the white
+    of Rec.709, which is rounded (tests/optics/colour/test_rgb_to_spectrum.py).
     """
     target = _BRIGHTEST * np.asarray(rgb, dtype=np.float64) / max(rgb)
     u, response = _response()

@@ -15,7 +15,12 @@ PANEL = "Lens"
 class LensOptions:
     """The lens: aperture, iris, coating, scatter, zoom, filters. None or empty: not given."""
 
-    fstop: Annotated[float | None, typer.Option(help="f-number (default: wide open).", rich_help_panel=PANEL)] = None
+    fstop: Annotated[
+        float | None,
+        typer.Option(
+            help="f-number (default: two stops down for a library lens, else wide open).", rich_help_panel=PANEL
+        ),
+    ] = None
     blades: Annotated[int | None, typer.Option(help="Number of iris blades; 0 is round.", rich_help_panel=PANEL)] = None
     rotation: Annotated[
         float | None, typer.Option(help="Rotation of the blades, degrees counter-clockwise.", rich_help_panel=PANEL)
