@@ -70,7 +70,18 @@ def test_the_srgb_view_leaves_what_a_screen_can_show():
     colours = np.random.default_rng(2).uniform(0.0, 1.0, (40, 40, 3)).astype(np.float32)
     exact = 255.0 * srgb_oetf(colours.astype(np.float64))
     assert np.abs(view(colours, 0.0, "srgb") - exact).max() < 0.5 + 2e-4
-    assert view(np.array([[[2.0, 0.5, 7.0]]], np.float32), 0.0, "srgb")[0, 0].tolist() == [255, 188, 255]
+
+
+def test_what_is_brighter_than_white_becomes_white_and_no_other_colour():
+    """Clipping each channel would show both as magenta, (255, 188, 255) and (255, 0, 255)."""
+    bright = np.array([[2.0, 0.5, 7.0], [1.2, 0.0, 4.0], [1e4, 2e4, 1e6]])
+    part = 1.0 / bright.max(axis=1, keepdims=True)
+    wanted = 1.0 - part + bright * part * part
+    codes = view(bright[None].astype(np.float32), 0.0, "srgb")[0]
+    assert np.abs(codes - 255.0 * srgb_oetf(wanted)).max() < 0.5 + 2e-3
+    # the order of the channels stays, and the largest is white
+    assert (np.argsort(codes[:2], axis=1) == np.argsort(bright[:2], axis=1)).all()
+    assert (codes[:, 2] == 255).all()
 
 
 def test_filmic_keeps_darks_rolls_off_and_reaches_white():

@@ -21,7 +21,7 @@ def shown_color(red, green, blue, filmic):
     red, green, blue : float32
         Linear Rec.709 after exposure, of any size; negative outside the gamut.
     filmic : bool
-        Whether bright light rolls off towards white; otherwise it clips.
+        Whether bright light rolls off towards white; otherwise only what is brighter than white changes.
 
     Returns
     -------
@@ -33,7 +33,8 @@ def shown_color(red, green, blue, filmic):
     The largest distance of a channel from grey, d = (max - min) / max, exceeds 1 where a channel is negative. All three
     distances are scaled by the same factor, so the colour moves along the line to the grey of its largest channel: the
     dominant wavelength and the order of the channels stay. Without `filmic`, d is clipped at 1, which leaves colours in
-    gamut unchanged; `filmic` uses the smooth knee of the ACES reference gamut compression,
+    gamut unchanged, and a colour brighter than white is white but for the part 1 / max, so it keeps its dominant
+    wavelength too; `filmic` uses the smooth knee of the ACES reference gamut compression,
     k + (1 - k) x / (1 + x^p)^(1/p) with x = (d - k) / (1 - k) and p = 1.2 (Academy S-2020-001), whose limit is 1. The
     largest channel rolls off by s + (1 - s) u / (1 + u), u = (v - s) / (1 - s), the others in proportion.
     """
@@ -47,6 +48,11 @@ def shown_color(red, green, blue, filmic):
     if kept < one:
         red, green, blue = high - (high - red) * kept, high - (high - green) * kept, high - (high - blue) * kept
     if not filmic:
+        if high > one:
+            # clipping each channel would make a bright blue magenta
+            part = one / high
+            white = one - part
+            red, green, blue = white + red * part * part, white + green * part * part, white + blue * part * part
         return min(max(red, zero), one), min(max(green, zero), one), min(max(blue, zero), one)
     tone, bend = high, np.float32(SHOULDER)
     if high > bend:

@@ -60,7 +60,7 @@ def view(
     exposure_stops : float or None
         The light is multiplied by 2 to this power; None: `auto_exposure`.
     transform : {"filmic", "srgb", "aces"}
-        filmic: bright light rolls off towards white. srgb: the exact sRGB curve, clipped at white. Both keep the
+        filmic: bright light rolls off towards white. srgb: the exact sRGB curve up to white. Both keep the
         dominant wavelength of colours outside Rec.709 (`kernels.raster.display_codes.shown_color`). aces: ACES 2
         through opencolorio.
     colorspace : {"rec709", "acescg"}
