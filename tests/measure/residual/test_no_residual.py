@@ -15,8 +15,8 @@ from flarewright.measure.core.checkpoint import Journal
 from flarewright.measure.fitting.ghost_fit import render
 
 PLANTED = SMALL_GHOSTS[:1]
-# bytes: some 4 kB per ghost, and the residual of five small pictures of noise
-SMALL, LARGE = 12_000, 30_000
+# bytes: some 4 kB per ghost, and the residual of four small pictures of noise
+SMALL, LARGE = 12_000, 20_000
 
 pytestmark = pytest.mark.usefixtures("no_crescents")
 
