@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from rich.markup import render as from_markup
+from singlet_file import singlet_file
 from typer.main import get_command
 
 import flarewright as fw
@@ -43,16 +44,6 @@ from flarewright.render.image.canvas import blank
 from flarewright.render.image.partial_picture import PartialPicture
 
 HELIAR_EFL = 99.235796
-SINGLET = """
-schema_version = 1
-name = "Singlet"
-f_number = 5.0
-rows = [
-  { radius = 50.0, thickness = 5.0, n_d = 1.5168, v_d = 64.17, semi_diameter = 10.0 },
-  { radius = -50.0, thickness = 2.0, semi_diameter = 10.0 },
-  { stop = true, thickness = 80.0 },
-]
-"""
 
 
 @pytest.fixture(autouse=True)
@@ -412,7 +403,7 @@ def test_ghosts_json_is_the_promised_contract(capsys, folder):
     same_side = call_json(capsys, *stopped, "--paths", "same-side")
     assert len(same_side["ghosts"]) == 13
     # a lens is wide open without an f-number
-    (folder / "singlet.toml").write_text(SINGLET)
+    singlet_file(folder)
     wide_open = call_json(capsys, "ghosts", "singlet.toml", "--light", "10,0")
     assert wide_open["f_number"] == 5.0
     assert wide_open["entrance_pupil_diameter_mm"] == pytest.approx(wide_open["efl_mm"] / 5.0, rel=1e-9)
