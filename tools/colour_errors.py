@@ -78,7 +78,7 @@ BROADBAND, EARLY, SINGLE = (
     Everywhere(coating=Standard(name=name)) for name in ("modern-broadband", "early-multicoat", "single-1950s")
 )
 STAGGERED = Preset(name="staggered")
-# the method was chosen on the first four lists
+# the method was chosen on the first five lists
 SCENES: dict[str, tuple[Scene, ...]] = {
     "known": (
         ("flektogon-35", BROADBAND, (10.0, 5.0), 8.0),
@@ -105,7 +105,7 @@ SCENES: dict[str, tuple[Scene, ...]] = {
         ("canon-70-200-wide", quarter(500.0), (-6.0, 8.0), 8.0),
         ("angenieux-50-f1.1", STAGGERED, (8.0, -3.0), 2.8),
     ),
-    # these, the fourth and the fifth were written down before any of them was looked at
+    # these and the following were written down before any of them was looked at
     "new": (
         ("canon-70-200-tele", BROADBAND, (-2.0, 3.5), 4.0),
         ("canon-70-200-wide", EARLY, (-13.0, 2.0), 5.6),
@@ -147,6 +147,20 @@ SCENES: dict[str, tuple[Scene, ...]] = {
         ("takumar-50-f1.4", quarter(560.0), (-5.0, -12.0), 4.0),
         ("angenieux-50-f1.1", quarter(510.0), (10.0, 2.0), 4.0),
         ("tessar-brendel", EARLY, (14.0, 8.0), 5.6),
+    ),
+    "sixth": (
+        ("canon-70-200", STAGGERED, (-7.0, -2.0), 4.0),
+        ("canon-70-200-wide", quarter(560.0), (11.0, 3.0), 2.8),
+        ("canon-28-80", quarter(490.0), (5.0, 10.0), 5.6),
+        ("nikon-28-75", EARLY, (4.0, 15.0), 4.0),
+        ("fisheye-nikkor-10.5", STAGGERED, (12.0, 50.0), 5.6),
+        ("nikkor-85-f1.4", quarter(600.0), (-6.0, 1.5), 8.0),
+        ("nikkor-180-ed", STAGGERED, (-2.5, 2.5), 4.0),
+        ("speed-panchro-50", quarter(540.0), (-7.0, -9.0), 4.0),
+        ("double-gauss-tronnier", STAGGERED, (10.0, -5.0), 5.6),
+        ("biotar-50-f1.4", STAGGERED, (7.0, 8.0), 2.8),
+        ("flektogon-35", quarter(470.0), (18.0, 10.0), 2.8),
+        ("angenieux-50-f1.1", BROADBAND, (-9.0, -4.0), 1.4),
     ),
 }
 
