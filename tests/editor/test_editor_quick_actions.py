@@ -55,6 +55,10 @@ def test_undo_takes_back_what_was_asked_for_last(tab):
     """Undo used to overtake the last key, which then ran after it."""
     before = tab.state()["lights"][0]["field_deg"]
     delay(tab)
+    # a busy browser may drop the repeat of a key
+    tab.js(
+        "{ window.keys = 0; addEventListener('keydown', (event) => { keys += event.key === 'ArrowRight'; }, true); }"
+    )
     tab.page.locator("#view").focus()
     for _ in range(20):
         # held down for longer than an answer takes
@@ -68,8 +72,10 @@ def test_undo_takes_back_what_was_asked_for_last(tab):
     assert tab.state()["undo"] == ""
     tab.page.keyboard.press("Control+Shift+z")
     tab.until("flarewright.state.undo === 'Move the light'")
-    # no key is lost
-    assert tab.state()["lights"][0]["field_deg"][0] == pytest.approx(before[0] + 2.0)
+    # no key that the page got is lost
+    keys = tab.js("keys")
+    assert keys > 10
+    assert tab.state()["lights"][0]["field_deg"][0] == pytest.approx(before[0] + 0.1 * keys)
 
 
 def test_undo_while_a_path_plays_can_be_done_again(tab):
