@@ -86,10 +86,11 @@ def find_light(radiance: Band, variance: Band, settings: LightSettings = LightSe
     other = _other(light, blobs, (x, y), radius, settings)
     reach = radius + settings.rim_px
     at_border = not (reach / 2 < x < width - reach / 2 and reach / 2 < y < height - reach / 2)
-    (x, y), error = _symmetric(light, variance.mean(axis=2, dtype=np.float64), clipped, (x, y), reach, settings)
+    of_channels = variance.mean(axis=2, dtype=np.float64)
+    (x, y), error = _symmetric(light, of_channels, clipped, (x, y), reach, settings)
     known = ~clipped
     # the mean of three channels
-    noise = float(np.sqrt(np.median(variance[known].mean(axis=1)) / 3.0)) if known.any() else 0.0
+    noise = float(np.sqrt(np.median(of_channels[known]) / 3.0)) if known.any() else 0.0
     median = float(np.median(light[known])) if known.any() else 0.0
     contrast = float(light.max()) / max(median, noise, 1e-30)
     row, column = (min(max(int(value) - 7, 0), side) for value, side in ((y, height), (x, width)))

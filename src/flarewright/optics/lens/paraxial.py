@@ -5,8 +5,10 @@ Rays are (y, u), the path is unfolded so that distances run forward (docs/physic
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,6 +21,8 @@ from .paths import LightPath, direct_path
 from .surface_shape import curvature_across
 
 Matrix = Floats
+# one index, or one at each wavelength
+_Index = TypeVar("_Index", float, Floats)
 
 # a few dozen steps take less time in Python than loading a compiled kernel
 _path_matrices = getattr(ghosts.path_matrices, "py_func", ghosts.path_matrices)
@@ -68,20 +72,21 @@ def vertex_positions(lens: Lens) -> Floats:
 
 def gap_indices(lens: Lens, wavelength_nm: float) -> Floats:
     """Return the index before row 0 and behind every row, shape (K + 1,)."""
-    indices = [1.0]
-    for row in lens.rows:
-        # the stop is a plane in a gap and has that gap's medium
-        indices.append(indices[-1] if isinstance(row, Stop) else _index(row.medium, wavelength_nm))
-    return np.array(indices)
+    return np.array(_in_gaps(lens, 1.0, lambda medium: _index(medium, wavelength_nm)))
 
 
 def gap_indices_at(lens: Lens, wavelengths_nm: Floats) -> Floats:
     """Return `gap_indices` at many wavelengths, shape (W, K + 1)."""
-    indices = [np.ones(len(wavelengths_nm))]
+    air = np.ones(len(wavelengths_nm))
+    return np.column_stack(_in_gaps(lens, air, lambda medium: air * refractive_index(medium, wavelengths_nm)))
+
+
+def _in_gaps(lens: Lens, air: _Index, index: Callable[[Medium | None], _Index]) -> list[_Index]:
+    found = [air]
     for row in lens.rows:
-        behind = indices[-1] if isinstance(row, Stop) else refractive_index(row.medium, wavelengths_nm)
-        indices.append(np.broadcast_to(behind, wavelengths_nm.shape))
-    return np.column_stack(indices)
+        # the stop is a plane in a gap and has that gap's medium
+        found.append(found[-1] if isinstance(row, Stop) else index(row.medium))
+    return found
 
 
 # cached: every frame of a sequence needs the same index

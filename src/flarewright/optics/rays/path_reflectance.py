@@ -29,7 +29,7 @@ from .pack import REFLECTANCE_SAMPLES, PackedLens, SensorMirror
 _Surface = tuple[Medium | None, Medium | None, tuple[float, ...], tuple[float, ...]]
 
 CURVE_NM = np.concatenate([
-    np.arange(VISIBLE_NM[0], 700.0, 2.5), np.arange(700.0, 795.0, 5.0), [795.0, 802.5, 810.0, 820.0, VISIBLE_NM[1]],
+    np.arange(VISIBLE_NM[0], 700.0, 2.5), np.arange(700.0, 800.0, 5.0), [802.5, 810.0, 820.0, VISIBLE_NM[1]],
 ])  # fmt: skip
 """Integration wavelengths for colours of coatings: dense where the eye sees much."""
 

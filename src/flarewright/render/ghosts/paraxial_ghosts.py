@@ -339,8 +339,7 @@ def _transmitted(paths: Sequence[LightPath], angles: Floats) -> Floats:
     of other colours are closer to it is a part of their throughput.
     """
     squares: Floats = angles[len(angles) // 2].copy()
-    _, actions, starts = joined_steps(tuple(paths))
-    most = np.maximum.reduceat(np.where(actions == REFRACT, angles, 0.0), starts[:-1], axis=1)
+    most, starts = _largest(paths, REFRACT, angles), joined_steps(tuple(paths))[2]
     least = most.argmin(axis=0)
     for p in np.flatnonzero(most[len(angles) // 2] > CRITICAL).tolist():
         squares[starts[p] : starts[p + 1]] = angles[least[p], starts[p] : starts[p + 1]]
@@ -349,10 +348,16 @@ def _transmitted(paths: Sequence[LightPath], angles: Floats) -> Floats:
 
 def _nearly_total(paths: Sequence[LightPath], angles: Floats) -> Mask:
     """Return which paths have a mirror near total reflection, where R is no parabola in the angle; (W, steps)."""
-    _, actions, starts = joined_steps(tuple(paths))
-    mirrors = np.where((actions == REFLECT) & (angles < 1.0), angles, 0.0).max(axis=0)
-    near: Mask = np.maximum.reduceat(mirrors, starts[:-1]) > CRITICAL
+    below = np.where(angles < 1.0, angles, 0.0)
+    near: Mask = _largest(paths, REFLECT, below).max(axis=0) > CRITICAL
     return near
+
+
+def _largest(paths: Sequence[LightPath], action: int, angles: Floats) -> Floats:
+    """Return the largest of the angles, (W, steps), at which each path is refracted or reflected, (W, P)."""
+    _, actions, starts = joined_steps(tuple(paths))
+    largest: Floats = np.maximum.reduceat(np.where(actions == action, angles, 0.0), starts[:-1], axis=1)
+    return largest
 
 
 def matrix_fluxes(

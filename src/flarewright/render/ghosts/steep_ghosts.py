@@ -55,7 +55,8 @@ FAINT_PART = 7e-4
 # steps of the search for an end between two wavelengths of a curve, to 0.08 nm
 BISECTIONS = 5
 # places and shares of Gauss' rule from 0 to 1 (Abramowitz and Stegun 1964, 25.4.30)
-ROOTS, SHARES = (0.5 * (one + shift) for one, shift in zip(np.polynomial.legendre.leggauss(4), (1.0, 0.0), strict=True))
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+ROOTS, SHARES = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 # rounding error of a sum of weights that is 1
 ROUNDING = 1e-9
 

@@ -75,7 +75,7 @@ class Between:
         Those are `BEYOND` and the ones at the ends of the light, or the lines farthest from all others.
         """
         if self.lines_nm is None:
-            return np.union1d(BEYOND, self._ends(END_PART))
+            return np.union1d(BEYOND, self._ends)
         far = np.abs(self.lines_nm[:, None] - traced_nm).min(axis=1)
         chosen: list[int] = []
         while len(chosen) < MOST_BEYOND and far.max() > CLOSE_NM:
@@ -86,10 +86,14 @@ class Between:
     @cached_property
     def steep(self) -> Indices:
         """Which of them drafts compute for steep ghosts besides those of `beyond`."""
-        inner = self._ends(INNER_PART) if len(self._ends(END_PART)) > 0 else np.zeros(0, np.intp)
-        return np.union1d(STEEP, inner)
+        return np.union1d(STEEP, self._beside(INNER_PART)) if len(self._ends) > 0 else np.array(STEEP)
 
-    def _ends(self, part: float) -> Indices:
+    @cached_property
+    def _ends(self) -> Indices:
+        """Which of them lie at the ends of a light that does not end near `BEYOND`."""
+        return self._beside(END_PART)
+
+    def _beside(self, part: float) -> Indices:
         """Return which of them lie where this part of X + Y + Z is beyond, at either end, unless near `BEYOND`."""
         ((wave, share),) = band_contents(self.spectrum, self.fine_nm[[0]])
         ends = np.interp([part, 1.0 - part], np.cumsum(share), wave)
