@@ -1,12 +1,15 @@
 """Default settings for lenses of the library."""
 
+import numpy as np
 import pytest
+from scipy import ndimage
 
 from flarewright.io.lens.library import library_names
-from flarewright.model import Bare, Light, Preset, Project
+from flarewright.model import Art, Bare, Camera, Light, Preset, Project, Rule
 from flarewright.optics.rays.pack import resolve_coatings
-from flarewright.render.scene.photographic_defaults import as_photographed, plausible_preset, stopped_down
-from flarewright.render.scene.resolve import load_lens
+from flarewright.render.render import render
+from flarewright.render.scene.photographic_defaults import LIGHT_DEG, as_photographed, plausible_preset, stopped_down
+from flarewright.render.scene.resolve import first_order, load_lens
 
 
 @pytest.mark.parametrize(
@@ -43,3 +46,28 @@ def test_ghosts_have_rings_behind_cylinders_too():
     filled, reported = as_photographed(shot)
     assert filled.quality == shot.quality
     assert not any("rings" in one for one in reported)
+
+
+@pytest.mark.parametrize(("name", "spikes"), [("takumar-50-f1.4", 6), ("flektogon-35", 18)])
+def test_spikes_taper_from_a_round_core(name, spikes):
+    """At one brightness spikes are nowhere much wider than at the core, narrow outwards, and have gaps between them."""
+    camera = Camera(size_px=(480, 480), sensor_mm=(16.0, 16.0))
+    shot, _ = as_photographed(Project(lens=name, lights=(Light(field_deg=(0.0, 0.0)),), camera=camera))
+    star = render(shot, art=Art(rules=(Rule(select="all", enable=False),))).layers[0]
+    green = star.pixels[..., 1]
+    angles = np.radians(np.arange(0.0, 360.0, 0.1))
+
+    def around(radius_px):
+        return ndimage.map_coordinates(green, 239.5 + radius_px * np.array([np.sin(angles), np.cos(angles)]), order=1)
+
+    disc_px = first_order(load_lens(name)).efl * np.radians(LIGHT_DEG / 2.0) * 480 / 16.0
+    core = around(0.8 * disc_px)
+    assert core.max() < 1.2 * core.min()
+    level = 0.5 * around(200.0).max()
+    widths = []
+    for radius_px in (50.0, 100.0, 200.0, 230.0):
+        seen = around(radius_px) > level
+        assert (seen & ~np.roll(seen, 1)).sum() == spikes
+        widths.append(radius_px * seen.mean())
+    assert max(widths) < 1.2 * widths[0]
+    assert widths[0] > widths[2] > 1.3 * widths[3]
