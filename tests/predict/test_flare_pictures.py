@@ -33,13 +33,13 @@ class Others:
     def __init__(self, most=None):
         self.lists, self.most = [], most
 
-    def __call__(self, wishes):
-        if wishes:
-            self.lists.append([wish.at for wish in wishes])
-        for wish in reversed(wishes):
+    def __call__(self, requests):
+        if requests:
+            self.lists.append([request.at for request in requests])
+        for request in reversed(requests):
             if self.most is not None and sum(map(len, self.lists)) > self.most:
                 raise KeyboardInterrupt
-            yield wish, wish.draw()
+            yield request, request.draw()
 
 
 def counted():
@@ -95,7 +95,7 @@ def test_plans_and_positions_do_not_depend_on_who_draws():
     # one list for the plan, and at most one for each round of positions
     assert len(others.lists) <= 6
     # nothing is missing for the next one
-    assert len(list(draw_all([found.tables[0][0].wish(*at) for at in drawn], Others(0)))) == len(drawn)
+    assert len(list(draw_all([found.tables[0][0].request(*at) for at in drawn], Others(0)))) == len(drawn)
 
 
 def test_pictures_before_an_interruption_are_kept():
@@ -105,11 +105,11 @@ def test_pictures_before_an_interruption_are_kept():
         planned(flare, memory, Others(0))
     assert drawn == []
 
-    def broken(wishes):
-        for k, wish in enumerate(wishes):
+    def broken(requests):
+        for k, request in enumerate(requests):
             if k == 3:
                 raise FlarewrightError("the connection with the cluster is lost")
-            yield wish, wish.draw()
+            yield request, request.draw()
 
     with pytest.raises(FlarewrightError, match="is lost"):
         planned(flare, memory, broken)
@@ -133,26 +133,26 @@ def test_a_process_makes_the_same_flare_again(tmp_path, monkeypatch):
     shown = lens_flare(project)
     table, memory, made = FlareTable(flare, frame), {}, {}
     monkeypatch.setattr(elsewhere, "_flares", made)
-    wishes = [table.wish(5.0, 0.0), table.wish(9.0, 0.0), in_colour(shown, memory, 5.0, 30.0)]
-    expected = [wish.draw() for wish in wishes]
-    one = list(elsewhere._spread(None, 1, 1, wishes))
-    assert [wish for wish, _ in one] == wishes
+    requests = [table.request(5.0, 0.0), table.request(9.0, 0.0), in_colour(shown, memory, 5.0, 30.0)]
+    expected = [request.draw() for request in requests]
+    one = list(elsewhere._spread(None, 1, 1, requests))
+    assert [request for request, _ in one] == requests
     for (_, picture), same in zip(one, expected, strict=True):
         assert picture.dtype == same.dtype
         assert np.array_equal(picture, same)
     assert set(made) == {flare.fingerprint, shown.fingerprint}
     # without a recipe it is drawn here
     made.clear()
-    ((_, here),) = elsewhere._spread(None, 1, 1, [FlareTable(replace(flare, recipe=None), frame).wish(5.0, 0.0)])
+    ((_, here),) = elsewhere._spread(None, 1, 1, [FlareTable(replace(flare, recipe=None), frame).request(5.0, 0.0)])
     assert np.array_equal(here, expected[0])
     assert made == {}
 
 
 def test_another_lens_on_a_worker_is_one_sentence(tmp_path):
     flare, frame = square_flare(singlet(tmp_path), statistics_quality("draft"))
-    wish = FlareTable(replace(flare, fingerprint="of another machine"), frame).wish(5.0, 0.0)
+    request = FlareTable(replace(flare, fingerprint="of another machine"), frame).request(5.0, 0.0)
     with pytest.raises(FlarewrightError, match="a worker reads another Singlet than this command; give all machines"):
-        list(elsewhere._spread(None, 1, 1, [wish]))
+        list(elsewhere._spread(None, 1, 1, [request]))
 
 
 @pytest.mark.parametrize(

@@ -140,7 +140,7 @@ def sample_curves(
 
     def ahead(angles: Sequence[float]) -> None:
         views = [at for at, _, _ in table.views(roll_deg)]
-        draw_all([table.wish(angle, at) for angle in angles for at in views], spread)
+        draw_all([table.request(angle, at) for angle in angles for at in views], spread)
 
     def draw(angle: float) -> Floats:
         if angle not in known:
@@ -162,7 +162,7 @@ def sample_curves(
         if error <= tolerance:
             break
         middle = 0.5 * (a + b)
-        if spread is not None and any(table.wish(middle, at).missing for at, _, _ in table.views(roll_deg)):
+        if spread is not None and any(table.request(middle, at).missing for at, _, _ in table.views(roll_deg)):
             # intervals above the tolerance are all halved, in whatever order, unless `most` ends the sampling
             ahead([0.5 * (low + high) for off, low, high in waiting[: most - len(known)] if off > tolerance])
         before = waiting.pop(0)[0]

@@ -167,8 +167,8 @@ def predict_occurrence(
     pictures: list[tuple[float, Pixels]] = []
     if wanted.pictures:
         angles = _worth_a_look(curves)
-        wishes = [in_colour(flares.shown, known, angle, wanted.roll_deg) for angle in angles]
-        pictures = list(zip(angles, draw_all(wishes, spread, reported("pictures")), strict=True))
+        requests = [in_colour(flares.shown, known, angle, wanted.roll_deg) for angle in angles]
+        pictures = list(zip(angles, draw_all(requests, spread, reported("pictures")), strict=True))
     return Occurrence(
         flares.sampled, flares.frame, flares.quality, curves, wanted.bins, check, None, wanted.setting, tuple(pictures)
     )

@@ -19,11 +19,11 @@ Luminance; in colour for a fingerprint with `IN_COLOUR`.
 """
 IN_COLOUR = "-rgb"
 
-__all__ = ["Drawn", "Memory", "Spread", "Wish", "draw_all", "in_colour"]
+__all__ = ["Drawn", "Memory", "PictureRequest", "Spread", "draw_all", "in_colour"]
 
 
 @dataclass(frozen=True)
-class Wish:
+class PictureRequest:
     """A picture that a prediction needs.
 
     Attributes
@@ -58,16 +58,18 @@ class Wish:
         return self.constellation_deg, self.roll_deg
 
 
-Spread = Callable[[Sequence[Wish]], Generator[tuple[Wish, Pixels], None, None]]
+Spread = Callable[[Sequence[PictureRequest]], Generator[tuple[PictureRequest, Pixels], None, None]]
 """Draws pictures by other processes, and yields each when it is finished (`workflow.flare_pictures`)."""
 
 
-def draw_all(wishes: Sequence[Wish], spread: Spread | None = None, progress: Progress | None = None) -> list[Pixels]:
+def draw_all(
+    requests: Sequence[PictureRequest], spread: Spread | None = None, progress: Progress | None = None
+) -> list[Pixels]:
     """Draw pictures that are not drawn yet, and keep each as soon as it is finished.
 
     Parameters
     ----------
-    wishes : sequence of Wish
+    requests : sequence of PictureRequest
     spread : callable, optional
         None: they are drawn here, one after the other.
     progress : callable, optional
@@ -75,24 +77,24 @@ def draw_all(wishes: Sequence[Wish], spread: Spread | None = None, progress: Pro
     Returns
     -------
     list of ndarray
-        In the order of the wishes.
+        In the order of the requests.
     """
     # flares that draw the same pictures share the place for them
-    missing = list({(id(wish.drawn), wish.at): wish for wish in wishes if wish.missing}.values())
+    missing = list({(id(request.drawn), request.at): request for request in requests if request.missing}.values())
     with closing((spread or _here)(missing)) as finished:
-        for k, (wish, picture) in enumerate(finished):
-            wish.drawn[wish.at] = picture
+        for k, (request, picture) in enumerate(finished):
+            request.drawn[request.at] = picture
             if progress is not None:
-                progress((k + 1) / len(missing), f"{wish.flare.name}, {wish.constellation_deg:.4g} degrees")
-    return [wish.drawn[wish.at] for wish in wishes]
+                progress((k + 1) / len(missing), f"{request.flare.name}, {request.constellation_deg:.4g} degrees")
+    return [request.drawn[request.at] for request in requests]
 
 
-def _here(wishes: Sequence[Wish]) -> Generator[tuple[Wish, Pixels], None, None]:
-    for wish in wishes:
-        yield wish, wish.draw()
+def _here(requests: Sequence[PictureRequest]) -> Generator[tuple[PictureRequest, Pixels], None, None]:
+    for request in requests:
+        yield request, request.draw()
 
 
-def in_colour(flare: Flare, memory: Memory, constellation_deg: float, roll_deg: float) -> Wish:
-    """Return the wish for a picture in colour, which belongs into a memory; into none without a fingerprint."""
+def in_colour(flare: Flare, memory: Memory, constellation_deg: float, roll_deg: float) -> PictureRequest:
+    """Return the request for a picture in colour, which belongs into a memory; into none without a fingerprint."""
     drawn = memory.setdefault(flare.fingerprint + IN_COLOUR, {}) if flare.fingerprint else {}
-    return Wish(flare, constellation_deg, roll_deg, True, drawn)
+    return PictureRequest(flare, constellation_deg, roll_deg, True, drawn)

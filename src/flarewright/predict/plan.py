@@ -14,7 +14,7 @@ from ..typing import Floats, Mask, Progress
 from .contrast import WASHED, contrast
 from .flare import Flare, Frame
 from .photometry import exposure_level
-from .pictures import Memory, Spread, Wish, draw_all
+from .pictures import Memory, PictureRequest, Spread, draw_all
 from .statistics import NAMES
 from .table import FlareTable
 from .tracks import CameraSighting, CameraTrack, camera_track, moments, sightings
@@ -29,8 +29,17 @@ NEAR = 50.0
 STAYS = 2.0
 
 __all__ = [
-    "FlareMaker", "Pair", "Plan", "Ranked", "near_or_far", "plan_scene", "ranking", "rounded_diameter",
-    "rounded_distance", "tables_of", "wishes_of",
+    "FlareMaker",
+    "Pair",
+    "Plan",
+    "Ranked",
+    "near_or_far",
+    "plan_scene",
+    "ranking",
+    "requests_of",
+    "rounded_diameter",
+    "rounded_distance",
+    "tables_of",
 ]  # fmt: skip
 
 
@@ -260,7 +269,11 @@ def plan_scene(
     pairs_of = (
         (table, sighting) for row in zip(tables, seen, strict=True) for table, sighting in zip(*row, strict=True)
     )
-    draw_all([wish for table, sighting in pairs_of for wish in wishes_of(table, sighting)], spread, reported("flares"))
+    draw_all(
+        [request for table, sighting in pairs_of for request in requests_of(table, sighting)],
+        spread,
+        reported("flares"),
+    )
     pairs, remarks = [], []
     for c, (camera, row) in enumerate(zip(scene.cameras, seen, strict=True)):
         remarks += [f"{camera.name}: {remark}" for table in tables[c] for remark in table.flare.remarks]
@@ -273,7 +286,7 @@ def plan_scene(
     return Plan(scene, times, dates, tracks, tables, tuple(pairs), tuple(dict.fromkeys(remarks)))
 
 
-def wishes_of(table: FlareTable, sighting: CameraSighting, times: Mask | None = None) -> list[Wish]:
+def requests_of(table: FlareTable, sighting: CameraSighting, times: Mask | None = None) -> list[PictureRequest]:
     """Return the pictures that the flare of a light needs.
 
     Parameters
@@ -285,16 +298,16 @@ def wishes_of(table: FlareTable, sighting: CameraSighting, times: Mask | None = 
 
     Returns
     -------
-    list of Wish
+    list of PictureRequest
         Each once.
     """
     angles = sighting.constellation_deg
     lit = table.flare.covers(angles) & (sighting.illuminance_lx > 0.0)
-    needed: dict[tuple[float, float], Wish] = {}
+    needed: dict[tuple[float, float], PictureRequest] = {}
     for t in np.flatnonzero(lit if times is None else lit & times):
         for node, roll, _, _ in table.nodes(float(angles[t]), float(sighting.roll_deg[t])):
-            wish = table.wish(node, roll)
-            needed[wish.at] = wish
+            request = table.request(node, roll)
+            needed[request.at] = request
     return list(needed.values())
 
 

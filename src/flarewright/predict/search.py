@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import ProjectError
 from ..typing import Floats, Progress
 from .pictures import Spread, draw_all
-from .plan import Plan, wishes_of
+from .plan import Plan, requests_of
 from .tracks import CameraSighting, camera_track, moved_by, sightings
 
 # least reduction of the veil for a position to count as better
@@ -141,7 +141,7 @@ def best_position(
         looks = [seen_from(offset) for offset in near]
         if spread is not None:
             pairs = [pair for _, seen in looks for pair in zip(tables, seen, strict=False)]
-            draw_all([wish for table, sighting in pairs for wish in wishes_of(table, sighting, known)], spread)
+            draw_all([request for table, sighting in pairs for request in requests_of(table, sighting, known)], spread)
         for offset, look in zip(near, looks, strict=True):
             offsets.append(offset)
             veils.append(veil(*look))

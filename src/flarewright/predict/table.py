@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import FlarewrightError
 from ..typing import Floats
 from .flare import Flare, Frame
-from .pictures import Drawn, Wish, draw_all
+from .pictures import Drawn, PictureRequest, draw_all
 from .statistics import NAMES, Statistics, covered_area, measure
 
 # drawn rolls per blade of an iris, and step of drawn rolls for a flare that cannot be rotated, degrees
@@ -50,13 +50,15 @@ class FlareTable:
                 f"{self.frame.width:g}x{self.frame.height:g} mm that turns needs {needed:.4g} mm both ways"
             )
 
-    def wish(self, constellation_deg: float, roll_deg: float) -> Wish:
-        """Return the wish for the picture at a constellation and a drawn roll."""
-        return Wish(self.flare, round(constellation_deg, DECIMALS), round(roll_deg, DECIMALS), drawn=self.drawn)
+    def request(self, constellation_deg: float, roll_deg: float) -> PictureRequest:
+        """Return the request for the picture at a constellation and a drawn roll."""
+        return PictureRequest(
+            self.flare, round(constellation_deg, DECIMALS), round(roll_deg, DECIMALS), drawn=self.drawn
+        )
 
     def light(self, constellation_deg: float, roll_deg: float) -> Floats:
         """Return the luminance of the picture at a constellation and roll, shape (H, W); drawn once."""
-        return draw_all([self.wish(constellation_deg, roll_deg)])[0].astype(np.float64)
+        return draw_all([self.request(constellation_deg, roll_deg)])[0].astype(np.float64)
 
     def _share(self, turn_deg: float) -> Floats:
         return covered_area(self.flare.size_px, self.flare.sensor, self.frame, round(turn_deg, 1))

@@ -69,15 +69,15 @@ def render_worst(
     scene = plan.scene
     known: Memory = {} if memory is None else memory
     chosen = [(one, one.worst) for one in ranked if one.worst is not None and one.worst_veil_cd_m2][:PICTURES]
-    wishes, factors = [], []
+    requests, factors = [], []
     for one, worst in chosen:
         seen = plan.pairs[one.camera][one.light].sighting
         flare, _ = near_or_far(maker, scene.cameras[one.camera], scene.lights[one.light], seen)
         factors.append(float(seen.illuminance_lx[worst]) / flare.scene_scale)
         at = float(seen.constellation_deg[worst]), float(seen.roll_deg[worst])
-        wishes.append(in_colour(flare, known, *at))
+        requests.append(in_colour(flare, known, *at))
     out = []
-    for (one, _), drawn, factor in zip(chosen, draw_all(wishes, spread, progress), factors, strict=True):
+    for (one, _), drawn, factor in zip(chosen, draw_all(requests, spread, progress), factors, strict=True):
         picture = (drawn * factor).astype(np.float32)
         bright = luminance(picture)
         washed = None

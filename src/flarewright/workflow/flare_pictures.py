@@ -17,7 +17,7 @@ from ..jobs.processes import shares, work_off
 if TYPE_CHECKING:
     from ..jobs.cluster.executor import Cluster
     from ..predict.flare import Flare
-    from ..predict.pictures import Spread, Wish
+    from ..predict.pictures import PictureRequest, Spread
     from ..typing import Pixels
 
 __all__ = ["draw_picture", "pictures_elsewhere"]
@@ -95,24 +95,24 @@ def pictures_elsewhere(
 
 
 def _spread(
-    executor: Cluster | None, processes: int | None, threads: int | None, wishes: Sequence[Wish]
-) -> Generator[tuple[Wish, Pixels], None, None]:
+    executor: Cluster | None, processes: int | None, threads: int | None, requests: Sequence[PictureRequest]
+) -> Generator[tuple[PictureRequest, Pixels], None, None]:
     recipes: dict[str, tuple[int, Recipe]] = {}
     items = []
-    for number, wish in enumerate(wishes):
-        name, recipe = wish.flare.fingerprint, wish.flare.recipe
+    for number, request in enumerate(requests):
+        name, recipe = request.flare.fingerprint, request.flare.recipe
         if recipe is None:
-            # nothing tells another process how to make it
-            yield wish, wish.draw()
+            # another process cannot make it
+            yield request, request.draw()
             continue
         place, _ = recipes.setdefault(name, (len(recipes), (name, recipe)))
-        items.append(_Picture(number, place, *wish.at, wish.colored))
+        items.append(_Picture(number, place, *request.at, request.colored))
     # each process keeps its number of threads over all lists, whatever their length
     most, each = shares(MOST_WORKERS, processes, threads)
     number = max(1, min(most, len(items)))
     context = tuple(one for _, one in recipes.values())
     for done in work_off(_DRAW, context, items, processes=number, threads=each, what="picture", executor=executor):
-        yield wishes[done.item.number], done.result
+        yield requests[done.item.number], done.result
 
 
 def draw_picture(context: Sequence[Recipe], item: _Picture, threads: int | None) -> Pixels:
@@ -133,7 +133,7 @@ def draw_picture(context: Sequence[Recipe], item: _Picture, threads: int | None)
     FlarewrightError
         This process reads other files than the caller.
     """
-    from ..predict.pictures import Wish
+    from ..predict.pictures import PictureRequest
 
     fingerprint, recipe = context[item.flare]
     if fingerprint not in _flares:
@@ -145,4 +145,4 @@ def draw_picture(context: Sequence[Recipe], item: _Picture, threads: int | None)
         if len(_flares) >= _MOST_FLARES:
             _flares.clear()
         _flares[fingerprint] = flare
-    return Wish(_flares[fingerprint], item.constellation_deg, item.roll_deg, item.colored).draw()
+    return PictureRequest(_flares[fingerprint], item.constellation_deg, item.roll_deg, item.colored).draw()
