@@ -34,10 +34,10 @@ def shown_color(red, green, blue, filmic):
     The largest distance of a channel from grey, d = (max - min) / max, exceeds 1 where a channel is negative. All three
     distances are scaled by the same factor, so the colour moves along the line to the grey of its largest channel: the
     dominant wavelength and the order of the channels stay. Without `filmic`, d is clipped at 1, which leaves colours in
-    gamut unchanged, and a colour brighter than white is white but for the part 1 / max; `filmic` uses the smooth knee of the ACES reference gamut compression,
-    k + (1 - k) x / (1 + x^p)^(1/p) with x = (d - k) / (1 - k) and p = 1.2 (Academy S-2020-001), whose limit is 1. The
-    largest channel rolls off by s + (1 - s) u / (1 + u), u = (v - s) / (1 - s), the others in proportion. What is mixed
-    with white keeps its hue as it is seen (`perceived_hue.keep_hue`).
+    gamut unchanged, and a colour brighter than white is white but for the part 1 / max; `filmic` uses the smooth knee
+    of the ACES reference gamut compression, k + (1 - k) x / (1 + x^p)^(1/p) with x = (d - k) / (1 - k) and p = 1.2
+    (Academy S-2020-001), whose limit is 1. The largest channel rolls off by s + (1 - s) u / (1 + u), u = (v - s) / (1 -
+    s), the others in proportion. What is mixed with white keeps its hue as it is seen (`perceived_hue.keep_hue`).
     """
     zero, one = np.float32(0.0), np.float32(1.0)
     red, green, blue = _bounded(red), _bounded(green), _bounded(blue)
