@@ -11,7 +11,7 @@ import pytest
 
 from flarewright import __version__
 from flarewright.cli.app import run
-from flarewright.cli.common import checkpoints, end_as_interrupted, stop_on_interrupt
+from flarewright.cli.common import checkpoints, end_as_interrupted, stop_on_interrupt, was_interrupted
 from flarewright.design.results import report
 from flarewright.design.solvers import pool_search
 from flarewright.design.thesis import benchmark as thesis
@@ -343,6 +343,7 @@ def test_signals_that_end_a_search(name):
 
 
 def test_signals_that_end_a_command(monkeypatch):
+    monkeypatch.setattr("flarewright.cli.common._received", [])
     kinds = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = [signal.signal(one, signal.SIG_DFL) for one in kinds]
     try:
@@ -352,6 +353,7 @@ def test_signals_that_end_a_command(monkeypatch):
         assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGTERM)
+        assert was_interrupted()
     finally:
         for one, handler in zip(kinds, before, strict=True):
             signal.signal(one, handler)
