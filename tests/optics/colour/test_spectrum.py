@@ -15,6 +15,7 @@ from flarewright.optics.colour.spectrum import (
     cie_1931,
     cubics,
     planck,
+    sampled_wavelengths,
     spectral_power,
     spectrum_xyz,
     traced_wavelengths,
@@ -55,6 +56,18 @@ def test_every_light_has_luminance_one():
 def test_the_sum_does_not_depend_on_the_sampling(count, light):
     fine = band_weights(light, np.arange(360, 831, 5), "acescg").sum(axis=0)
     np.testing.assert_allclose(band_weights(light, traced_wavelengths(count), "acescg").sum(axis=0), fine, atol=1e-12)
+
+
+def test_dense_samples_integrate_what_steep_films_reflect():
+    """Two broadband films of a Flektogon reflect 13 times as much at 400 nm as at 420."""
+    nodes, fine = sampled_wavelengths(1, D65()), np.arange(360.0, 830.5, 0.5)
+
+    def light(wave, **how):
+        return np.exp(-0.13 * np.clip(wave - 395.0, 0.0, None)) @ band_weights(D65(), wave, "rec709", **how)
+
+    exact = light(fine)
+    assert np.abs(light(nodes, cubic=True) - exact).max() < 0.006 * exact.max()
+    assert np.abs(light(nodes) - exact).max() > 0.02 * exact.max()
 
 
 def test_weights_integrate_what_is_linear_between_the_nodes():

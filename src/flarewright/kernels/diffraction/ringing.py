@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...typing import Floats, Indices, Pixels
-from ..jit.decorators import borrowing, compiled
+from ..jit.decorators import borrowing, compiled, embedded
 from ..raster.bundle import (
     SLIVER,
     _gather_cell,
@@ -169,7 +169,7 @@ def draw_ringing(data, pupil, triangles, densities, patterns, axes, to_pixels, g
             start = end
 
 
-@borrowing
+@embedded
 def _draw_cell(bundle, start, end, texture, target, room):
     """Draw the triangles around a node as one polygon; return False if they must be drawn one by one.
 
@@ -207,7 +207,7 @@ def _draw_cell(bundle, start, end, texture, target, room):
     return fits
 
 
-@borrowing
+@embedded
 def _draw_triangle(bundle, t, texture, target, room):
     """Draw one triangle of a bundle."""
     values, table, corners, places = texture[:4]

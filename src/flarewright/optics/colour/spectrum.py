@@ -218,7 +218,9 @@ def luminance_shares(spectrum: Spectrum) -> tuple[Floats, Floats]:
     return wave, xyz[:, 1]
 
 
-def band_weights(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colorspace) -> Floats:
+def band_weights(
+    spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colorspace, *, cubic: bool = False
+) -> Floats:
     """Return the RGB weight of each traced wavelength, for a light of luminance 1.
 
     Parameters
@@ -227,6 +229,9 @@ def band_weights(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colo
     wavelengths_nm : array_like, shape (N,)
         Traced wavelengths, ascending.
     colorspace : {"rec709", "acescg"}
+    cubic : bool
+        Integrate what is cubic between the nodes instead of linear, for nodes as dense as `sampled_wavelengths`: what
+        two films reflect can grow by a factor of 13 within 20 nm, and a line between nodes 5 nm apart is 3 % too bright.
 
     Returns
     -------
@@ -244,10 +249,11 @@ def band_weights(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colo
     -----
     C_k = integral S(l) cmf(l) h_k(l) dl in steps of 1 nm. h_k is the piecewise-linear hat function on the nodes,
     constant beyond the first and the last, so sum_k C_k f(l_k) integrates any f exactly that is linear between nodes; a
-    ghost's brightness is smooth in wavelength. Lines are split between their two neighbours.
+    ghost's brightness is smooth in wavelength. Lines are split between their two neighbours. With `cubic`, h_k are the
+    weights of `cubics`.
     """
     wave, xyz = _stimulus(spectrum)
-    weights: Floats = hats(wave, wavelengths_nm) @ xyz @ xyz_to_rgb_matrix(colorspace).T
+    weights: Floats = (cubics if cubic else hats)(wave, wavelengths_nm) @ xyz @ xyz_to_rgb_matrix(colorspace).T
     return weights
 
 

@@ -74,6 +74,9 @@ class Shot:
         reflectances at the traced wavelengths, and colours are interpolated linearly.
     between : Between or None
         The lens at other wavelengths; None if the spectrum has no light there or none is drawn.
+    dense : bool
+        Whether the wavelengths sample all visible light (`optics.colour.spectrum.sampled_wavelengths`), so that colours
+        are interpolated cubically.
     """
 
     light: Light
@@ -90,6 +93,7 @@ class Shot:
     grating: SensorGrating | None = None
     curves: BandCurves | None = None
     between: Between | None = None
+    dense: bool = False
 
     @property
     def gain(self) -> float:
@@ -110,7 +114,7 @@ class Shot:
         wavelengths_nm : ndarray, shape (N,)
             The traced wavelengths, or wavelengths between them at which rays are interpolated.
         spectrum : PathSpectrum, optional
-            What the path passes; None: linear between the traced wavelengths.
+            What the path passes; None: linear or cubic between the traced wavelengths, as `dense` tells.
 
         Returns
         -------
@@ -119,7 +123,7 @@ class Shot:
         """
         look = self.light.spectrum, tuple(wavelengths_nm), self.colorspace
         if spectrum is None:
-            return _weights(*look)
+            return _weights(*look, self.dense)
         carried = carried_at(self, spectrum, wavelengths_nm)
         # `tensordot` would use a threaded library, whose threads compete with ours
         weights: Floats = np.einsum("...l,lwc->...wc", spectrum.passed, _parts(*look))
@@ -171,8 +175,8 @@ def at_fine_wavelengths(shot: Shot) -> Shot:
 
 
 @lru_cache(maxsize=512)
-def _weights(spectrum: Spectrum, wavelengths_nm: tuple[float, ...], colorspace: Colorspace) -> Floats:
-    return band_weights(spectrum, np.array(wavelengths_nm), colorspace)
+def _weights(spectrum: Spectrum, wavelengths_nm: tuple[float, ...], colorspace: Colorspace, cubic: bool) -> Floats:
+    return band_weights(spectrum, np.array(wavelengths_nm), colorspace, cubic=cubic)
 
 
 @lru_cache(maxsize=256)

@@ -84,6 +84,7 @@ def make_shots(settled: ResolvedProject, opening: Opening, *, sampled: bool = Fa
                     grating=project.camera.sensor_grating,
                     curves=bands,
                     between=between_them,
+                    dense=sampled and not whole_light,
                 )
             )
         shots += whole if project.holdout is None and light.holdout is None else _unhidden(settled, light, whole)
