@@ -37,6 +37,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...colorimetry import PRIMARIES
 from ...errors import FileError, FlarewrightError, OutputError
 from ...model.layer import Layer
 from ...model.matte import GhostMatte
@@ -46,7 +47,7 @@ from ..files.atomic_write import write_atomically
 from ..files.door import outside, printable, sentences_for, shown
 from ..files.silence_libraries import silenced
 from .cryptomatte import matte_attributes, matte_layers, matte_names
-from .file_space import PRIMARIES, FileSpace
+from .file_space import FileSpace
 from .half import HALF_MAX, half_scale, rounded_to_half
 
 # the built-in spaces by their names of the ASWF Color Interop Forum

@@ -11,20 +11,15 @@ from flarewright.errors import FlarewrightError
 from flarewright.model.project.camera import Colorspace
 from flarewright.model.project.light import D65, BlackBody, EqualEnergy, Lines, Rgb, Spectrum
 
+from ...colorimetry import VISIBLE_NM
 from ...typing import Floats
-from .cie1931 import D65_POWER, FIRST_NM, STEP_NM, Y_BAR, cie_1931, cmf_at_1_nm
+from .cie1931 import D65_POWER, TABLE_NM, cie_1931, cmf_at_1_nm
 from .rgb import xyz_to_rgb_matrix
 from .rgb_to_spectrum import smoothest_reflectance, uplift
-
-VISIBLE_NM = (360.0, 830.0)
-"""Range over which colours are integrated: that of the colour matching functions (CIE 018:2019). Of X, Y and Z, 4e-6 of
-daylight and 12e-6 of an incandescent lamp lie beyond 780 nm, but films reflect so much there that it counts in ghosts
-under a black body of 2000 K."""
 
 _H, _C, _KB = 6.62607015e-34, 299792458.0, 1.380649e-23  # exact SI values
 
 __all__ = [
-    "VISIBLE_NM",
     "band_contents",
     "band_parts",
     "band_shares",
@@ -83,7 +78,7 @@ def spectral_power(spectrum: Spectrum, wavelength_nm: ArrayLike) -> Floats:
         return np.ones_like(wave)
     if isinstance(spectrum, D65):
         # D65 is defined as linear between steps of 10 nm, so this is exact
-        return np.interp(wave, _table_nm(), D65_POWER, left=0.0, right=0.0)
+        return np.interp(wave, TABLE_NM, D65_POWER, left=0.0, right=0.0)
     if isinstance(spectrum, BlackBody):
         return planck(wave, spectrum.temperature_k)
     if isinstance(spectrum, Lines):
@@ -416,10 +411,6 @@ def _band_contents(spectrum: Spectrum, nodes_nm: tuple[float, ...]) -> tuple[tup
         held = (wave[first:last][lit], share[lit] / share[lit].sum()) if most > 0.0 else (np.array([node]), np.ones(1))
         found.append(held)
     return tuple(found)
-
-
-def _table_nm() -> Floats:
-    return FIRST_NM + STEP_NM * np.arange(len(Y_BAR), dtype=np.float64)
 
 
 def _stimulus(spectrum: Spectrum) -> tuple[Floats, Floats]:

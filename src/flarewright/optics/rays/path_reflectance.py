@@ -13,13 +13,14 @@ from functools import cache, cached_property, lru_cache
 
 import numpy as np
 
+from ...colorimetry import VISIBLE_NM
 from ...kernels.paraxial.path_reflectance import path_throughput, throughput_between
 from ...kernels.tracing.representative_rays import traced_squares
 from ...model import Coating, Lens, Medium, Stop
 from ...model.project.light import Spectrum
 from ...typing import Floats, Indices
 from ..coatings.thin_film import film_stack, stack_reflectance
-from ..colour.spectrum import VISIBLE_NM, band_shares, cubics
+from ..colour.spectrum import band_shares, cubics
 from ..lens.dispersion import refractive_index
 from ..lens.paraxial import D_LINE_NM, gap_indices
 from ..lens.paths import LightPath

@@ -10,10 +10,10 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
+from ...colorimetry import VISIBLE_NM
 from ...errors import ProjectError
 from ...io.images.mask_image import read_mask
 from ...model import Dirt, Iris, Layer, Lines, Starburst
-from ...optics.colour.spectrum import VISIBLE_NM
 from ...optics.diffraction.fraunhofer import BladeWings, Pattern, Soil, pupil_pattern
 from ...optics.lens.paths import direct_path
 from ...optics.pupil.polygon import mapped, points

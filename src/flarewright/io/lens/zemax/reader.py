@@ -19,6 +19,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from flarewright.colorimetry import VISIBLE_NM
 from flarewright.errors import GlassError
 from flarewright.model import Medium, Surface
 from flarewright.model.lens.prescription import MOST_TERMS
@@ -43,7 +44,6 @@ _AIR = ("AIR", "VACUUM")
 _AIR_TOLERANCE = 5e-4
 # a larger semi-diameter in mm is a misprint
 _WIDEST = 2000.0
-_VISIBLE_UM = (0.36, 0.83)
 # largest number of unknown keywords that are named
 _LISTED = 8
 _MOULDED = ("_MOLD", "_MOULD")
@@ -443,7 +443,7 @@ def _remark_wavelength(found: Text) -> None:
     """Append a remark when the primary wavelength is invisible: the lens is then not made for a camera."""
     primary = int(number_of((found.head.get("PWAV") or ["1"])[0]) or 1)
     wavelength_um = found.wavelengths_um.get(primary)
-    if wavelength_um is not None and not _VISIBLE_UM[0] <= wavelength_um <= _VISIBLE_UM[1]:
+    if wavelength_um is not None and not VISIBLE_NM[0] <= 1000.0 * wavelength_um <= VISIBLE_NM[1]:
         found.remarks.append(
             f"the file's primary wavelength is {1000.0 * wavelength_um:g} nm, not visible: focal length and image hold "
             "at 587.6 nm here; flarewright lens show --wavelength gives others"
