@@ -57,7 +57,7 @@ def framed(project: Project, flags: RenderOptions) -> tuple[Project, tuple[int, 
     sensor = project.camera.replace(squeeze=squeeze).sensor if project.camera.desqueeze else project.camera.sensor
     remarks: list[str] = []
     if named:
-        fixed = flags.size is not None or flags.project is not None or flags.resumed is not None
+        fixed = flags.size is not None or flags.project is not None
         size, sensor, words = on_sensor(camera_format(flags.sensor or ""), size if fixed else None, squeeze)
         remarks.append(words)
     counted = size if flags.crop is None else _cropped(size, flags.crop)

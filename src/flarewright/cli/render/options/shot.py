@@ -160,5 +160,5 @@ class ShotOptions(
 ):
     """The options as given; the last base comes first on the help page."""
 
-    resumed: Any = None
-    """A `Project` that a look has made."""
+    base: Any = None
+    """The `Project` of the file."""
