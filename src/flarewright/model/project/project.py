@@ -6,8 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictBool, field_validator, model_validator
 
+from ...errors import ProjectError
 from ..base import Frozen
-from ..lens.coating import COATINGS, Coating
+from ..lens.coating import COATINGS, STANDARD_NAMES, Coating
 from ..lens.imperfection import Imperfection
 from ..lens.iris import Iris
 from ..lens.plate import Plate
@@ -262,9 +263,9 @@ class Project(Frozen):
     @classmethod
     def _coating_is_no_text(cls, coating: Any) -> Any:
         if isinstance(coating, str):
-            raise ValueError(
-                f"{coating!r} is a text; write coating=flarewright.parse_coating_choice({coating!r}), or pass it to "
-                "flarewright.render next to the project"
+            raise ProjectError(
+                f"coating {coating!r} is a text; write coating=flarewright.Standard(NAME) with one of "
+                f"{', '.join(STANDARD_NAMES)}, or flarewright.parse_coating_choice({coating!r}) for others"
             )
         return everywhere(coating)
 

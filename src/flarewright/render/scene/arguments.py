@@ -34,6 +34,14 @@ if TYPE_CHECKING:
         Timeline,
     )
 
+
+class _AsInProject:
+    """Default of a setting in a signature."""
+
+    def __repr__(self) -> str:
+        return "<as in the project>"
+
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -109,7 +117,7 @@ def naming_settings(function: Callable[P, R]) -> Callable[P, R]:
     plain = signature(function)
     named = [one for one in plain.parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
     named += [
-        Parameter(name, Parameter.KEYWORD_ONLY, default=..., annotation=annotation.__forward_arg__)
+        Parameter(name, Parameter.KEYWORD_ONLY, default=_AsInProject(), annotation=annotation.__forward_arg__)
         for name, annotation in Settings.__annotations__.items()
     ]
     # `inspect.signature` reads this attribute
