@@ -29,7 +29,7 @@ STAYS = 2.0
 
 __all__ = [
     "FlareMaker", "Pair", "Plan", "Ranked", "near_or_far", "plan_scene", "ranking", "rounded_diameter",
-    "rounded_distance", "tables_of",
+    "rounded_distance",
 ]  # fmt: skip
 
 
@@ -157,26 +157,10 @@ class Ranked:
     brightest_stops: float | None = None
 
 
-def tables_of(
+def _tables_of(
     scene: Scene, seen: Sequence[Sequence[CameraSighting]], maker: FlareMaker, memory: Memory | None = None
 ) -> tuple[tuple[FlareTable, ...], ...]:
-    """Build the tables of all cameras and lights; equal flares share their pictures.
-
-    Parameters
-    ----------
-    scene : Scene
-    seen : sequence of sequence of Sighting
-    maker : callable
-        Maps (camera, light, diameter_deg, distance_m) to a flare for tables and the camera's frame; a distance of None
-        is infinite.
-    memory : dict, optional
-        Pictures drawn before, by the flares' fingerprints; new ones are added.
-
-    Returns
-    -------
-    tuple of tuple of FlareTable
-        By camera and light.
-    """
+    """Build the tables of all cameras and lights; equal flares share their pictures."""
     known: Memory = {} if memory is None else memory
     out = []
     for camera, row in zip(scene.cameras, seen, strict=True):
@@ -230,11 +214,12 @@ def plan_scene(
     ----------
     scene : Scene
     maker : callable
-        As in `tables_of`.
+        Maps (camera, light, diameter_deg, distance_m) to a flare for tables and the camera's frame; a distance of None
+        is infinite.
     reported : callable
         Called with the name of a part of the work; returns the progress callback of that part.
     memory : dict, optional
-        As in `tables_of`.
+        Pictures drawn before, by the flares' fingerprints; new ones are added.
 
     Returns
     -------
@@ -248,7 +233,7 @@ def plan_scene(
     times, dates = moments(scene)
     tracks = tuple(camera_track(one, times, f"cameras[{c}] ({one.name})") for c, one in enumerate(scene.cameras))
     seen = sightings(scene, tracks, times, dates)
-    tables = tables_of(scene, seen, maker, memory)
+    tables = _tables_of(scene, seen, maker, memory)
     draw_ahead(tables, seen, reported("flares"))
     pairs, remarks = [], []
     for c, (camera, row) in enumerate(zip(scene.cameras, seen, strict=True)):

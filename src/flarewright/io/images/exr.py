@@ -1,6 +1,6 @@
 """OpenEXR files: layers as parts, the project in the metadata.
 
-`write_exr` and `read_exr` are for our own files; `read_exr_plane` and `read_exr_colour` read files of other programs.
+`write_exr` and `read_exr` are for our own files; `read_exr_plane` and `read_exr_layer` read files of other programs.
 
 Every program opens the first part: the first layer (the beauty) with plain channels R, G, B. Each further layer is a
 separate part, named after the layer, with channels `layer.R`, `layer.G`, `layer.B`; compositing programs list it
@@ -400,29 +400,6 @@ def read_exr_grey(
         grey = _plane(*_part_with(file, choices))
         part = next((part for part in file.parts if "A" in part.channels), None)
         return grey, None if part is None else _plane(part, ("A",))
-
-
-def read_exr_colour(path: str | PathLike[str], what: str = "an EXR file") -> Pixels:
-    """Read the colours of any EXR file within its display window.
-
-    Parameters
-    ----------
-    path : path
-        With channels R, G and B, or a single channel, or Y (grey).
-    what : str
-        Expected kind of file, for messages.
-
-    Returns
-    -------
-    ndarray, shape (H, W, 3), float32
-        0 outside the data window, and for values that are infinite or NaN.
-
-    Raises
-    ------
-    FileError
-        When it is not a readable EXR file, or has none of these channels.
-    """
-    return read_exr_layer(path, None, what)[0]
 
 
 def read_exr_layer(

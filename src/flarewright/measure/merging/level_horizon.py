@@ -48,7 +48,7 @@ def make_upright(folder: Path, run: MergedRun, tell: Progress) -> MergedRun:
         raise OutputError(f"cannot make the folder {folder / UPRIGHT}: {(error.strerror or '').lower()}") from None
     infos = []
     for k, info in enumerate(run.frames):
-        frame = turned_upright(read_frame(folder, info))
+        frame = _turned_upright(read_frame(folder, info))
         here: FrameInfo = frame.info.replace(file=f"{UPRIGHT}/{Path(info.file).name}")
         write_frame(folder, MergedFrame(here, frame.radiance, frame.variance))
         infos.append(here)
@@ -58,18 +58,8 @@ def make_upright(folder: Path, run: MergedRun, tell: Progress) -> MergedRun:
     return out
 
 
-def turned_upright(frame: MergedFrame) -> MergedFrame:
-    """Rotate a frame about its axis by the tilt of its horizon.
-
-    Parameters
-    ----------
-    frame : MergedFrame
-
-    Returns
-    -------
-    MergedFrame
-        Its roll is the nominal one; pixels from beyond the border have infinite variance.
-    """
+def _turned_upright(frame: MergedFrame) -> MergedFrame:
+    """Rotate a frame about its axis by the tilt of its horizon; beyond the border the variance is infinite."""
     info = frame.info
     tilt = radians(info.horizon_deg)
     c, s = cos(tilt), sin(tilt)

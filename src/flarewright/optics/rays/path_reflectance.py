@@ -46,7 +46,6 @@ __all__ = [
     "band_curves",
     "coating_curves",
     "joined_steps",
-    "path_products",
     "path_spectra",
     "products_between",
     "step_squares",
@@ -237,30 +236,11 @@ def path_spectra(curves: BandCurves, paths: Sequence[LightPath], squares: Floats
     PathSpectrum
         Of all paths; means over the rays.
     """
-    through = path_products(curves.reflectance, paths, squares)
-    return PathSpectrum(through[:, : len(CURVE_NM)], through[:, len(CURVE_NM) :])
-
-
-def path_products(reflectance: Floats, paths: Sequence[LightPath], squares: Floats) -> Floats:
-    """Multiply R and T along paths.
-
-    Parameters
-    ----------
-    reflectance : ndarray, shape (K, COSINES, M)
-        Any columns of `BandCurves.reflectance`.
-    paths, squares
-        As in `path_spectra`.
-
-    Returns
-    -------
-    ndarray, shape (P, M)
-        Means over the rays.
-    """
-    through = np.empty((len(paths), reflectance.shape[2]))
+    through = np.empty((len(paths), curves.reflectance.shape[2]))
     path_throughput(
-        np.ascontiguousarray(reflectance), *joined_steps(tuple(paths)), np.ascontiguousarray(squares), through
+        np.ascontiguousarray(curves.reflectance), *joined_steps(tuple(paths)), np.ascontiguousarray(squares), through
     )
-    return through
+    return PathSpectrum(through[:, : len(CURVE_NM)], through[:, len(CURVE_NM) :])
 
 
 def products_between(

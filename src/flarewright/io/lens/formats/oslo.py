@@ -83,7 +83,6 @@ class _Reading:
 
     name: str = ""
     count: int | None = None
-    unit_mm: float = 1.0
     head: dict[str, float] = field(default_factory=dict)
     surfaces: dict[int, _Surface] = field(default_factory=lambda: {0: _Surface(0)})
     at: int = 0
