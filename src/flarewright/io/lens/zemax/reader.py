@@ -17,18 +17,16 @@ from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from flarewright.colorimetry import VISIBLE_NM
 from flarewright.errors import GlassError
-from flarewright.model import Medium, Surface
+from flarewright.model import Medium
 from flarewright.model.lens.prescription import MOST_TERMS
 from flarewright.model.lens.raw_lens import Configuration, RawSequence, SequenceRow
 
 from ...files.door import shown
-from ...files.sentences import did_you_mean, shorten, validation_sentences
+from ...files.sentences import did_you_mean, shorten
 from .. import media
-from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_data, number_of, whole
+from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_data, number_of, sequence_row, whole
 from ..glass_catalogue import CatalogueGlass, by_name, same_name
 from ..lens_fields import CURVATURE, ROW_NUMBERS
 from .configurations import configurations
@@ -143,21 +141,13 @@ def _row(
         return None
     thickness = _gap(block, found) * mm
     values = _shape(block, mm, found) | {"thickness": thickness, "semi_diameter": _rim(block, mm, found)}
+    values["medium"] = None
     if refusal := CURVATURE.refuse(values.get("curvature", 0.0)):
         problems.append(f"{where}: the curvature {refusal}")
     if glass:
         values["medium"] = _medium(block.number, glass, found, findings)
-        if thickness < 0.0:
-            problems.append(f"{where}: glass cannot be {thickness:g} mm thick")
-    if len(problems) > before:
-        return None
-    try:
-        return SequenceRow(
-            number=block.number, surface=Surface(**values), stop="STOP" in block.words, automatic_rim=_automatic(block)
-        )  # fmt: skip
-    except ValidationError as error:
-        problems += [f"{where}: {sentence}" for sentence in validation_sentences(error)]
-        return None
+    stop, automatic = "STOP" in block.words, _automatic(block)
+    return sequence_row(where, problems, before, number=block.number, stop=stop, automatic_rim=automatic, **values)
 
 
 def _glass_of(block: Block) -> list[str]:
