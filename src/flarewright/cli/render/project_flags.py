@@ -12,7 +12,7 @@ from ...errors import ProjectError
 from ...io.lens.coating_text import parse_coating_choice
 from ...io.lens.plate_text import parse_grating, parse_imperfection, parse_plate
 from ...io.project.camera_list import is_camera_name
-from ...io.project.project_file import ProjectFileError, validation_messages
+from ...io.project.project_file import validation_messages
 from ...io.project.spectrum_text import parse_spectrum
 from ...model import Art, Holdout, Iris, Lens, Light, Project, ProjectCurve, Scatter
 from ...model.project.camera import Colorspace
@@ -189,7 +189,7 @@ def project_of(fields: dict[str, Any]) -> Project:
         if len(findings) == 1:
             raise ProjectError(findings[0]) from None
         message = f"{len(findings)} settings cannot be used, the first: {findings[0]}"
-        raise ProjectFileError(message, tuple(findings)) from None
+        raise ProjectError(message, tuple(findings)) from None
 
 
 def _check_together(flags: RenderOptions) -> None:

@@ -11,7 +11,7 @@ from math import atan, degrees
 from pathlib import Path
 
 from ... import __version__
-from ...errors import FlarewrightError, LensError, OutputError, ProjectError
+from ...errors import FlarewrightError, LensError, OutputError, ProjectError, raised_as
 from ...io.files.atomic_write import write_bytes_atomically
 from ...io.files.door import expanded, outside
 from ...io.files.file_kind import LENS_SUFFIXES, kind_of
@@ -152,10 +152,8 @@ def _without_commands(words: str) -> str:
 
 def read_toml_of(path: Path) -> dict[str, object]:
     """Read TOML; raise a one-sentence error if it is invalid."""
-    try:
+    with raised_as(ProjectError):
         return read_toml(path, "a project or lens file")
-    except ValueError as error:
-        raise ProjectError(str(error)) from None
 
 
 def _is_project(data: dict[str, object]) -> bool:

@@ -38,7 +38,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...colorimetry import PRIMARIES
-from ...errors import FileError, FlarewrightError, OutputError
+from ...errors import FileError, FlarewrightError, OutputError, raised_as
 from ...model.layer import Layer
 from ...model.matte import GhostMatte
 from ...model.project.camera import Colorspace
@@ -288,11 +288,8 @@ def read_exr(path: str | PathLike[str]) -> ExrContents:
     OutputError
         When it is not a readable EXR file.
     """
-    try:
-        with sentences_for(path, "an EXR file"):
-            return _contents(_open_parts(path, "an EXR file"))
-    except FileError as error:
-        raise OutputError(str(error)) from error
+    with raised_as(OutputError), sentences_for(path, "an EXR file"):
+        return _contents(_open_parts(path, "an EXR file"))
 
 
 def _contents(file: Any) -> ExrContents:
@@ -506,11 +503,8 @@ def exr_size(path: str | PathLike[str]) -> tuple[int, int]:
     """
     import OpenEXR
 
-    try:
-        with outside(path, "an EXR file"):
-            low, high = OpenEXR.File(str(path), header_only=True).header()["dataWindow"]
-    except FileError as error:
-        raise OutputError(str(error)) from error
+    with raised_as(OutputError), outside(path, "an EXR file"):
+        low, high = OpenEXR.File(str(path), header_only=True).header()["dataWindow"]
     return int(high[0] - low[0]) + 1, int(high[1] - low[1]) + 1
 
 
@@ -532,11 +526,8 @@ def scale_in_exr(path: str | PathLike[str]) -> float:
     """
     import OpenEXR
 
-    try:
-        with outside(path, "an EXR file", remedy="give an EXR file"):
-            return _scale(OpenEXR.File(str(path), header_only=True).parts[0])
-    except FileError as error:
-        raise OutputError(str(error)) from error
+    with raised_as(OutputError), outside(path, "an EXR file", remedy="give an EXR file"):
+        return _scale(OpenEXR.File(str(path), header_only=True).parts[0])
 
 
 def _prefixed(header: Mapping[str, Any], prefix: str) -> dict[str, Any]:

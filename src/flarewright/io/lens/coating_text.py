@@ -26,7 +26,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from flarewright.errors import ProjectError
+from flarewright.errors import ProjectError, raised_as
 from flarewright.model import (
     AsLens,
     Bare,
@@ -239,10 +239,8 @@ def read_coating_file(path: str | Path) -> CoatingChoice:
     ProjectError
         When the file cannot be read, has none or several of the keys, or has invalid entries; lists all of these.
     """
-    try:
+    with raised_as(ProjectError):
         table = read_toml(path, "a coating file")
-    except ValueError as error:
-        raise ProjectError(str(error)) from None
     if set(table) == {"coating"}:
         return Everywhere(coating=coating_from(table["coating"]) or Bare())
     for key, place in (("rows", "row"), ("in_turn", "coating")):

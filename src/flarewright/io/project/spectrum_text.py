@@ -18,7 +18,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from ...errors import ProjectError
+from ...errors import ProjectError, raised_as
 from ...model.project.light import D65, BlackBody, EqualEnergy, Lines, Rgb, Spectrum, Tabulated
 from ..files.text_file import read_text
 
@@ -87,10 +87,8 @@ def spectrum_text(spectrum: Spectrum) -> str | None:
 
 def _read_table(path: Path) -> Tabulated:
     """Read two columns, wavelength in nm and relative power; empty lines, # and one header line are skipped."""
-    try:
+    with raised_as(ProjectError):
         lines = read_text(path, "a spectrum table").splitlines()
-    except ValueError as error:
-        raise ProjectError(str(error)) from None
     pairs: list[tuple[float, float]] = []
     headline_seen = False
     for number, line in enumerate(lines, 1):

@@ -106,10 +106,10 @@ def project_of(given: Project | Lens | str | PathLike[str], **settings: Unpack[S
         return Project.model_validate(fields)
     except ValidationError as error:
         from ...io.files.sentences import summary
-        from ...io.project.project_file import ProjectFileError, validation_messages
+        from ...io.project.project_file import validation_messages
 
         findings = validation_messages(error, fields)
-        raise ProjectFileError(summary("the project", findings), tuple(findings)) from None
+        raise ProjectError(summary("the project", findings), tuple(findings)) from None
 
 
 def naming_settings(function: Callable[P, R]) -> Callable[P, R]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...colorimetry import VISIBLE_NM
-from ...errors import ProjectError
+from ...errors import ProjectError, raised_as
 from ...io.images.mask_image import read_mask
 from ...model import Dirt, Iris, Layer, Lines, Starburst
 from ...optics.diffraction.fraunhofer import BladeWings, Pattern, Soil, pupil_pattern
@@ -297,13 +297,11 @@ def _patterns(scene: _Scene, shot: Shot, turns: Floats) -> list[Pattern | None]:
             return [None] * len(turns)
         # the traced pupil already contains the blades
         iris, span = Iris(), PUPIL_SPAN
-    try:
+    with raised_as(ProjectError):
         return [
             pupil_pattern(iris, mask, span=span, radius_mm=order.stop_semi_diameter, soil=scene.soil, turn=float(turn))
             for turn in turns
         ]
-    except ValueError as error:
-        raise ProjectError(str(error)) from error
 
 
 def _diffracted_wavelengths(shot: Shot) -> Floats:
