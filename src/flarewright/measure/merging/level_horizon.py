@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import OutputError
+from ...io.files.atomic_write import make_folder
 from ...io.measurement.merged import read_frame, write_frame
 from ...model.measurement.capture import FrameInfo, MergedFrame, MergedRun
 from ...typing import Floats, Pixels, Progress
@@ -42,10 +42,7 @@ def make_upright(folder: Path, run: MergedRun, tell: Progress) -> MergedRun:
     Interpolation is bilinear, which lowers a pixel's variance and correlates neighbours. Search and fit do not need
     such frames: they use the tilt of each frame.
     """
-    try:
-        (folder / UPRIGHT).mkdir(exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot make the folder {folder / UPRIGHT}: {(error.strerror or '').lower()}") from None
+    make_folder(folder / UPRIGHT)
     infos = []
     for k, info in enumerate(run.frames):
         frame = _turned_upright(read_frame(folder, info))
