@@ -8,8 +8,6 @@ import numpy as np
 
 from .typing import Floats
 
-__all__ = ["D65_WHITE", "PRIMARIES", "VISIBLE_NM", "rgb_to_xyz", "xyz_of"]
-
 VISIBLE_NM = (360.0, 830.0)
 """Range over which colours are integrated: that of the colour matching functions (CIE 018:2019). Of X, Y and Z, 4e-6 of
 daylight and 12e-6 of an incandescent lamp lie beyond 780 nm, but films reflect so much there that it counts in ghosts

@@ -15,8 +15,6 @@ from ..errors import ProjectError
 from ..optics.colour.rgb import luminance_weights
 from ..typing import Floats, Indices, Mask, Pixels
 
-__all__ = ["LUMINANCE", "DetectionSettings", "Sources", "find_sources", "mean_luminance", "plate_luminance"]
-
 LUMINANCE = luminance_weights("rec709")
 """Luminance of linear Rec.709."""
 # places at which a change of colour is searched

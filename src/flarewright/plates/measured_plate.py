@@ -9,8 +9,6 @@ from ..model.project.camera import Colorspace
 from ..optics.colour.rgb import xyz_to_rgb_matrix
 from ..typing import Floats, Pixels
 
-__all__ = ["converted", "expanded", "measured_pixels"]
-
 
 def converted(plate: PlatePicture, colorspace: Colorspace) -> Pixels:
     """Return the pixels of a plate with the primaries of a colour space.

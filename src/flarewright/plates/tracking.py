@@ -19,8 +19,6 @@ from scipy.spatial import cKDTree
 from ..typing import Floats
 from .detection import LUMINANCE, Sources
 
-__all__ = ["TrackingSettings", "Tracks", "follow", "steady"]
-
 
 @dataclass(frozen=True)
 class TrackingSettings:

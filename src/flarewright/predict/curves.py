@@ -19,8 +19,6 @@ FAINT = 1e-3
 # ratio of adjacent samples that counts as a discontinuity
 CLIFF = 30.0
 
-__all__ = ["Check", "Curves", "bins_of", "check_curves", "sample_curves"]
-
 
 @dataclass(frozen=True)
 class Curves:

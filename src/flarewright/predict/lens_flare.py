@@ -22,8 +22,6 @@ LEAST_FRONT = 2.0
 # width in pixels of pictures for statistics; a flare is smooth except for its brightest spots
 SIDE_PX = 192
 
-__all__ = ["largest_constellation", "lens_flare", "luminous", "square_flare", "statistics_quality"]
-
 
 def statistics_quality(mode: str) -> Quality:
     """Return the quality of renders for statistics, coarse where averages do not change.

@@ -27,11 +27,6 @@ NEAR = 50.0
 # change of distance, as a factor, below which ghosts hardly change
 STAYS = 2.0
 
-__all__ = [
-    "FlareMaker", "Pair", "Plan", "Ranked", "near_or_far", "plan_scene", "ranking", "rounded_diameter",
-    "rounded_distance",
-]  # fmt: skip
-
 
 @dataclass(frozen=True)
 class Pair:

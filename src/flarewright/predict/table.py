@@ -26,8 +26,6 @@ Luminance; in colour for a fingerprint with `IN_COLOUR`.
 """
 IN_COLOUR = "-rgb"
 
-__all__ = ["IN_COLOUR", "Drawn", "FlareTable", "Memory", "known_picture"]
-
 
 def known_picture(flare: Flare, memory: Memory, constellation_deg: float, roll_deg: float) -> Pixels:
     """Return `Flare.picture`, drawn once.

@@ -16,8 +16,6 @@ from .table import Memory, known_picture
 # largest number of pairs of camera and light
 PICTURES = 6
 
-__all__ = ["Worst", "render_worst"]
-
 
 @dataclass(frozen=True)
 class Worst:

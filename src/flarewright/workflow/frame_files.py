@@ -7,8 +7,6 @@ from typing import Any
 from ..jobs.frame_list import FramePattern
 from ..model import Project
 
-__all__ = ["holdout_files", "with_frame_files"]
-
 
 def holdout_files(project: Project) -> tuple[str, ...]:
     """Return the files that hide lights of a project, or names with a place for the number of the frame."""

@@ -15,10 +15,6 @@ from ..io.project.project_file import validation_messages
 from ..model import BlackBody, Iris, Light, Project, Rgb, Timeline
 from ..model.project.animation import Curve, Motion
 
-__all__ = [
-    "frame_rate", "is_still", "length_s", "light_at", "peak_intensity", "project_at", "still", "time_of", "value_at",
-]  # fmt: skip
-
 
 def value_at(at_s: float, times_s: Sequence[float], values: Sequence[float], motion: Motion = "linear") -> float:
     """Interpolate keys at a time.

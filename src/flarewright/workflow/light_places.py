@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from ..render.scene.pixel_place import DirectImages
     from ..typing import Progress
 
-__all__ = ["LightFinder", "assigned", "lights_at_pixels", "resting_tracks", "timeline_of_tracks", "with_tracks"]
-
 # curves of a project that move the direct image of a light: all but the gains, which change only its brightness
 _LENS_CURVES = frozenset({"zoom", "focus_distance", "f_number", "rotation_deg"})
 # a light in a 3D scene is never farther from the axis than this, degrees

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from ...model import Project
     from .options.record import RenderOptions
 
-__all__ = ["framed", "on_sensor"]
-
 # width of a picture of film, which has no pixels
 _FILM_WIDTH_PX = 1280
 _PART = re.compile(r"^\s*(\d+(?:\.\d+)?)\s*(%|px)?\s*$")

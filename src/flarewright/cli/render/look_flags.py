@@ -13,8 +13,6 @@ from ...render.scene.photographic_defaults import as_photographed
 from .options.record import RenderOptions
 from .project_flags import flag_lights
 
-__all__ = ["put_look", "settings_of"]
-
 
 def put_look(flags: RenderOptions, name: str) -> tuple[RenderOptions, frozenset[str], tuple[str, ...]]:
     """Apply a look below the flags: to their lens and lights, to those of their project, or to the look's own.

@@ -16,11 +16,6 @@ if TYPE_CHECKING:
     from ...model import Project
     from .options.record import RenderOptions
 
-__all__ = [
-    "GivenTrack", "from_top_left", "given_tracks", "pixel_place", "placed", "px_origin", "track_files",
-    "with_given_tracks", "with_lights", "with_new_lights",
-]  # fmt: skip
-
 
 @dataclass(frozen=True, eq=False)
 class GivenTrack:

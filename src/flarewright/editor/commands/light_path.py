@@ -6,8 +6,6 @@ from ...errors import ProjectError
 from ...model import Light, LightKey, Project
 from ...workflow.keyframes import project_at
 
-__all__ = ["STEP_S", "clear_keys", "go_to", "move_key", "remove_key", "set_key"]
-
 # time step of keys: two times within half a step belong to the same key
 STEP_S = 0.01
 

@@ -12,8 +12,6 @@ from ...colorimetry import PRIMARIES as KNOWN
 from ...typing import Pixels
 from ..images.transfer import Transfer, decoded
 
-__all__ = ["PRIMARIES", "WEIGHTS", "FilmCoding", "linear_pixels", "signal_of", "to_rec709"]
-
 WEIGHTS = {"bt709": (0.2126, 0.0722), "bt601": (0.299, 0.114), "bt2020": (0.2627, 0.0593), "smpte240m": (0.212, 0.087)}
 """Weights of red and blue in luma, of each matrix (ITU-R BT.709, BT.601 and BT.2020, SMPTE 240M)."""
 

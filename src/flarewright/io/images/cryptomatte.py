@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from ...model.matte import GhostMatte
 from ...typing import Pixels
 
-__all__ = ["NAME", "identifier", "matte_attributes", "matte_layers", "matte_names", "murmur3_32"]
-
 NAME = "CryptoGhost"
 """Name of the Cryptomatte; its layers are this and two digits."""
 

@@ -20,8 +20,6 @@ LARGEST = 16384
 # names of depth channels, in order of preference
 DEPTH_NAMES = (("Z",), ("depth",), ("depth.Z",), ("Depth.Z",), ("R",))
 
-__all__ = ["read_depth", "read_matte"]
-
 
 def read_matte(path: str | os.PathLike[str]) -> Pixels:
     """Read a grey image as transmittance; white is 1.

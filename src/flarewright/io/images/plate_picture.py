@@ -20,8 +20,6 @@ from .half import HALF_MAX
 from .picture import SCREEN
 from .transfer import Transfer, decoded, white_of
 
-__all__ = ["PLATE_SUFFIXES", "PlatePicture", "read_plate"]
-
 _TIFF = (".tif", ".tiff")
 PLATE_SUFFIXES = (".exr", *_TIFF, *SCREEN)
 """Kinds of files that a plate can be."""

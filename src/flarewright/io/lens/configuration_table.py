@@ -194,6 +194,3 @@ def _field(values: Mapping[Place, float], commands: Commands, stated: Stated) ->
     if stated.active.image_height is not None:
         return {"image_height": largest * stated.mm}
     return {"field_deg": largest} if stated.active.field_deg is not None and largest < 90.0 else {}
-
-
-__all__ = ["MOST", "NOWHERE", "Commands", "Place", "Stated", "settings"]

@@ -104,17 +104,3 @@ def largest_field(x: Sequence[float | None], y: Sequence[float | None]) -> float
         Columns of a file, of any unit; a missing number is 0.
     """
     return max((math.hypot(a or 0.0, b or 0.0) for a, b in zip_longest(x, y)), default=0.0)
-
-
-__all__ = [
-    "INFINITE",
-    "MOST_SURFACES",
-    "decoded",
-    "json_number",
-    "largest_field",
-    "lens_data",
-    "lens_errors",
-    "number_of",
-    "sequence_row",
-    "whole",
-]

@@ -9,8 +9,6 @@ from ...errors import ProjectError, raised_as
 from ..files.file_kind import Kind, refuse_lens_suffix, refuse_other_kind
 from ..files.text_file import read_toml
 
-__all__ = ["read_file_of_kind"]
-
 
 def read_file_of_kind(path: Path, kind: Kind, what: str) -> dict[str, Any]:
     """Return the parsed contents of a TOML file.

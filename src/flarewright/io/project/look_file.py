@@ -25,8 +25,6 @@ _NEWEST = 1
 _EXAMPLE_KEYS = ("schema_version", "name", "notes", "lens", "zoom")
 """Keys of a look file that do not belong to the look: its texts, and the lens of its example."""
 
-__all__ = ["look_path", "look_text", "read_look", "shipped_looks"]
-
 
 @cache
 def shipped_looks() -> tuple[str, ...]:

@@ -15,8 +15,6 @@ from ...io.files.text_file import read_toml
 from ...io.files.type_slips import record_of
 from ...model.base import Frozen
 
-__all__ = ["SlurmSettings", "read_slurm_settings"]
-
 # SLURM's own forms: 90, 1:30:00, 2-12:00:00
 _WALLTIME = re.compile(r"(\d{1,4}-)?\d{1,4}(:\d{1,2}){0,2}", re.ASCII)
 _MEMORY = re.compile(r"\d+(\.\d+)?\s?[KMGT]i?B", re.ASCII)

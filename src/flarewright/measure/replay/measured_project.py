@@ -467,9 +467,3 @@ def _remarks(project: Project, flare: MeasuredFlare, seen: Sequence[_Seen], tota
     if not total.pixels.any():
         reported.append(BLACK if any(one.part > 0.0 for one in seen) else HIDDEN)
     return tuple(reported)
-
-
-__all__ = [
-    "MeasuredFlare", "check_measured", "efl_mm", "flare_of", "is_measured", "opening_of", "render_any",
-    "render_measured",
-]  # fmt: skip

@@ -268,21 +268,3 @@ def fitting_weights(weights: tuple[float, ...] | None, choices: tuple[Any, ...] 
     if not sum(weights) > 0.0:
         raise ValueError("all weights are 0, so nothing can be drawn; give one above 0")
     return weights
-
-
-__all__ = [
-    "KINDS",
-    "AnyDistribution",
-    "Choice",
-    "Constant",
-    "Distribution",
-    "Integers",
-    "LogUniform",
-    "Normal",
-    "TextChoice",
-    "Texts",
-    "Uniform",
-    "fitting_weights",
-    "rising_limits",
-    "within",
-]

@@ -22,14 +22,6 @@ from .presets import MGF2, standard_films
 MAGNESIUM_FLUORIDE = MGF2
 """Lowest index of real coating materials."""
 
-__all__ = [
-    "MAGNESIUM_FLUORIDE",
-    "film_stack",
-    "reflectance_table",
-    "stack_reflectance",
-    "stack_reflectance_transmittance",
-]
-
 
 def film_stack(coating: Coating | None, n_front: float, n_back: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the films of a coating in the order in which light along +z meets them.

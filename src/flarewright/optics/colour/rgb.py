@@ -29,14 +29,6 @@ _OKLAB_AXES = np.array([
     [0.0259040371, 0.7827717662, -0.8086757660],
 ])  # fmt: skip
 
-__all__ = [
-    "adapted_to_rgb_matrix",
-    "brightest_channel",
-    "luminance_weights",
-    "oklab",
-    "xyz_to_rgb_matrix",
-]
-
 
 @lru_cache
 def xyz_to_rgb_matrix(colorspace: Colorspace) -> Floats:

@@ -17,8 +17,6 @@ _NEWTON_STEPS = 24
 # converged when no channel has an error above this fraction of the brightest
 CLOSE = 1e-6
 
-__all__ = ["CLOSE", "smoothest_reflectance", "uplift"]
-
 
 def smoothest_reflectance(coefficients: tuple[float, float, float], wavelength_nm: Floats) -> Floats:
     """Evaluate the curve family of smooth spectra.

@@ -19,22 +19,6 @@ from .rgb_to_spectrum import smoothest_reflectance, uplift
 
 _H, _C, _KB = 6.62607015e-34, 299792458.0, 1.380649e-23  # exact SI values
 
-__all__ = [
-    "band_contents",
-    "band_parts",
-    "band_shares",
-    "band_weights",
-    "covers_all_lines",
-    "cubics",
-    "hats",
-    "luminance_shares",
-    "planck",
-    "sampled_wavelengths",
-    "spectral_power",
-    "spectrum_xyz",
-    "traced_wavelengths",
-]
-
 
 def planck(wavelength_nm: ArrayLike, temperature_k: float) -> Floats:
     """Return the spectral radiance of a black body (Planck's law).

@@ -29,17 +29,6 @@ CORE_REACH = 60.0
 
 FAN_BINS = 720
 
-__all__ = [
-    "CORE_REACH",
-    "BladeWings",
-    "FanWings",
-    "Pattern",
-    "Soil",
-    "SpikeProfile",
-    "pupil_pattern",
-    "spike_profile",
-]
-
 
 @dataclass(frozen=True)
 class FanWings:

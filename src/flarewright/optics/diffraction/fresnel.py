@@ -69,20 +69,6 @@ wave by 0.7 % there, where it has faded out, and by a fourth of that where the f
 _END = 0.5 * FADE[1] ** 2
 _TO_STEP = (TURN_STEPS**2 - 1) / _END
 
-__all__ = [
-    "FADE",
-    "REACH",
-    "SHADOW",
-    "Box",
-    "FresnelGrid",
-    "band_pattern",
-    "crop",
-    "ending",
-    "fresnel_grid",
-    "fresnel_intensity",
-    "halved_pattern",
-]
-
 
 @dataclass(frozen=True)
 class FresnelGrid:

@@ -15,8 +15,6 @@ from flarewright.model.lens.iris import Iris
 
 from ...typing import Floats
 
-__all__ = ["blade_edges", "coverage", "iris_outline", "resampled", "softened", "transmission"]
-
 
 def blade_edges(iris: Iris, semi_diameter: float) -> Floats:
     """Return the blades of the opening as implicit functions.

@@ -14,21 +14,6 @@ from ...typing import Floats
 # columns of an edge: start, end, and weight
 START, END, WEIGHT = slice(0, 2), slice(2, 4), 4
 
-__all__ = [
-    "END",
-    "START",
-    "WEIGHT",
-    "backward",
-    "centroid",
-    "closed",
-    "content",
-    "mapped",
-    "points",
-    "rim",
-    "shape_brightness",
-    "solid_angle",
-]
-
 
 def closed(corners: Floats) -> Floats:
     """Return the border of a polygon.

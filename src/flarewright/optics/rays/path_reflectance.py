@@ -37,20 +37,6 @@ CURVE_NM = np.concatenate([
 COSINES = 65
 """Samples of a curve over the cosine of incidence; a line between them errs by 6e-5 of R at most up to 60 degrees."""
 
-__all__ = [
-    "COSINES",
-    "CURVE_NM",
-    "BandCurves",
-    "CoatingCurves",
-    "PathSpectrum",
-    "band_curves",
-    "coating_curves",
-    "joined_steps",
-    "path_spectra",
-    "products_between",
-    "step_squares",
-]
-
 
 # compared by identity: the cache (`_stacked`) returns one object for equal coatings
 @dataclass(frozen=True, eq=False)

@@ -25,13 +25,6 @@ RINGS, SPOKES = 160, 32
 # indices that differ by less belong to the same glass
 SAME_INDEX = 1e-9
 
-__all__ = [
-    "ScatterTables",
-    "abg_density",
-    "roughness_density",
-    "scatter_tables",
-]
-
 
 def roughness_density(v: ArrayLike, wavelength_nm: float, correlation_um: float, slope: float) -> Floats:
     """Return the distribution of a rough surface's scatter over v, per area of v.

@@ -20,8 +20,6 @@ SLOPE = 0.926
 SIZES, SMALLEST, LARGEST = 180, 3.0, 6000.0
 ANGLES, FIRST_V, PER_ANGLE = 40, 2e-4, 6
 
-__all__ = ["dust_density", "particles_above"]
-
 
 def particles_above(diameter_um: Floats, level: float) -> Floats:
     """Return the number of particles at least as large as a diameter, up to a cleanliness level, on 1 mm^2.

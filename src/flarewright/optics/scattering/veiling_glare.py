@@ -17,8 +17,6 @@ from ..rays.pack import PackedLens
 # rays per side of three grids: to find the transmitting part of the last surface, within it, and for the direct path
 COARSE, FINE, DIRECT = 48, 64, 256
 
-__all__ = ["from_surround", "object_nearness"]
-
 
 def object_nearness(packed: PackedLens, lens: Lens, w: int = 0) -> float:
     """Return the reciprocal object distance of the plane in focus, by matrices.

@@ -30,8 +30,6 @@ LEAST_LIGHTS = 8
 # largest number of paths traced together to their common first mirror; rays of more do not fit the processor's cache
 GROUP_SIZE = 8
 
-__all__ = ["ghost_search", "group_by_mirror"]
-
 
 def group_by_mirror(paths: Sequence[LightPath]) -> list[list[LightPath]]:
     """Split paths into groups with a common first mirror; the groups keep the order of the paths.

@@ -60,19 +60,6 @@ ROOTS, SHARES = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 # rounding error of a sum of weights that is 1
 ROUNDING = 1e-9
 
-__all__ = [
-    "bent_spectrum",
-    "bent_weights",
-    "ends",
-    "gaps_at_ends",
-    "light_up_to_its_end",
-    "over",
-    "steep_gaps",
-    "steep_paths",
-    "steepness",
-    "within_gaps",
-]
-
 
 def steepness(
     shot: Shot, bundle: Bundle, spectrum: PathSpectrum | None, to_pixels: Floats

@@ -20,8 +20,6 @@ from ...optics.colour.rgb import adapted_to_rgb_matrix, xyz_to_rgb_matrix
 from ...typing import Floats
 from .aces_view import aces_available
 
-__all__ = ["check_file_space", "config_digest", "config_name", "has_film_primaries", "in_file_space"]
-
 DEFAULT = "ocio://default"
 """The configuration that the library has built in."""
 

@@ -38,8 +38,6 @@ SMALL_DEG = 0.6
 each ghost over its disc takes several times as long as drawing it, and softens its edge by a few pixels. Starbursts of
 such discs are shifted as those of points: at another angle a disc's image is a few per cent longer."""
 
-__all__ = ["DragPicture", "DragStar", "StarburstCanvas", "moving_picture"]
-
 
 @dataclass(frozen=True)
 class StarburstCanvas:

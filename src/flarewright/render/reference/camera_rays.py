@@ -23,8 +23,6 @@ CIRCLES, DIRECTIONS, DISC_MARGIN = 17, 48, 1.01
 # number of strips into which a border is divided
 STRIPS = 64
 
-__all__ = ["CameraSource", "camera_source", "run_camera"]
-
 
 @dataclass(frozen=True)
 class CameraSource:

@@ -68,8 +68,6 @@ FINE = Sampling(16, 52, 24, 18)
 # a quarter of the time (docs/scatter.md)
 COARSE = Sampling(8, 36, 16, 12)
 
-__all__ = ["check_scatter", "chosen_scatter", "render_scatter", "scatter_facts", "scatter_of", "without_scattered"]
-
 
 def chosen_scatter(settled: ResolvedProject) -> Scatter | None:
     """Return the scatter settings of the project, or else of the lens file; None if nothing scatters."""

@@ -28,16 +28,6 @@ TRIANGLES = 4096
 # a mask of the traced rays that pass
 RayFilter = Callable[[Floats], Mask]
 
-__all__ = [
-    "RayFilter",
-    "direct_flux",
-    "direct_spectrum",
-    "pixel_frame",
-    "spread_rays",
-    "traced_spectrum",
-    "visible_rays",
-]
-
 
 def traced_spectrum(shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floats) -> PathSpectrum | None:
     """Compute what coatings pass along a ghost's rays, as a spectrum.

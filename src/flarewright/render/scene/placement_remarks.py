@@ -17,8 +17,6 @@ UNIFORM_RATIO = 1.5
 # largest number of lights listed separately
 MOST_LISTED = 3
 
-__all__ = ["outside_remarks", "veil_remarks"]
-
 
 def outside_remarks(shots: Sequence[Shot], images: Sequence[DirectImage]) -> list[str]:
     """Return remarks on lights that are imaged outside the picture.

@@ -45,8 +45,6 @@ KNOTS = 1200
 MOST_PARTS = 100_000_000
 """Largest number of parts of the pixels near the centre, limited by memory."""
 
-__all__ = ["Painter", "painter_of", "starburst_layer"]
-
 
 def starburst_layer(
     iris: Iris,

@@ -41,8 +41,6 @@ MANY_LIGHTS = 8
 # least number of lights per basis spectrum for which drawing them together saves time
 LIGHTS_PER_SPECTRUM = 6
 
-__all__ = ["read_soil", "starburst_of"]
-
 
 @dataclass(frozen=True)
 class _Scene:

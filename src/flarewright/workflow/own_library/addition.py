@@ -304,6 +304,3 @@ class _Names:
         self._keys.add(key_of(record.name))
         if record.digest:
             self._by_digest[record.digest] = record.name
-
-
-__all__ = ["Addition", "Refused", "add_lenses"]

@@ -107,6 +107,3 @@ def _write(name: str, pixels: NDArray[np.uint8]) -> Path:
     writable_folder()
     write_atomically(target, partial(Image.fromarray(pixels).save, format="JPEG", quality=_QUALITY))
     return target
-
-
-__all__ = ["make_thumbnails", "missing_thumbnails", "read_thumbnail"]

@@ -27,19 +27,6 @@ from .plate_files import plate_picture
 from .plate_frame import bare_text, check_plate, images_of, plate_images, plate_optics, same_optics
 from .plate_sources import PlateShot, plate_shot
 
-__all__ = [
-    "FoundLights",
-    "backplate_picture",
-    "backplate_shot",
-    "kept_on_plate",
-    "plate_settings_of",
-    "search_plate",
-    "search_values",
-    "traced_places",
-    "with_found_lights",
-    "without_found_lights",
-]
-
 # frame of a single plate
 _FRAME = 1
 # largest disc and rectangle after a change of the lens, degrees

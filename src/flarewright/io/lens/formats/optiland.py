@@ -327,6 +327,3 @@ def _entry(geometry: dict[str, Any], gap: float, stop: bool) -> dict[str, Any]:
     interaction = {"type": "RefractiveReflectiveModel", "is_reflective": False, "coating": None, "bsdf": None}
     entry = {"type": "Surface", "thickness": gap, "geometry": geometry, "is_stop": stop}
     return entry | {"comment": "", "interaction_model": interaction}
-
-
-__all__ = ["optiland_text", "read_optiland"]

@@ -410,6 +410,3 @@ def _remark(reading: _Reading) -> None:
     for key, at in reading.unknown.items():
         where = f"surface{'s'[: len(at) > 1]} {', '.join(at[:20])}"
         reading.remarks.append(f"{where}: command {shorten(key)} is left out")
-
-
-__all__ = ["read_len"]

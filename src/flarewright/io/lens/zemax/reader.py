@@ -483,6 +483,3 @@ def _number(block: Block, key: str, problems: list[str]) -> float:
 def _length(block: Block, key: str, problems: list[str], infinite: float) -> float:
     words = block.words.get(key)
     return infinite if words and words[0].upper() == "INFINITY" else _number(block, key, problems)
-
-
-__all__ = ["read_zmx"]
