@@ -44,6 +44,14 @@ class NumberField:
             return f"is {shorten(value)}: it must be {'below' if self.high_open else 'at most'} {self.high:g}{unit}"
         return None
 
+    def read(self, value: object, where: str, problems: list[str]) -> float | None:
+        """Return a valid value as a number; None for an invalid one, whose error is appended."""
+        refusal = self.refuse(value)
+        if refusal is None:
+            return float(value)  # type: ignore[arg-type]
+        problems.append(f"{where} {refusal}")
+        return None
+
     def schema(self) -> dict[str, Any]:
         """Return the field's JSON Schema."""
         return {

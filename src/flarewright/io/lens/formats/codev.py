@@ -261,8 +261,7 @@ def _row(surface: _Surface, mm: float, radii: bool, reading: _Reading) -> Sequen
     elif rest:
         medium = _medium(rest[0], surface.number, reading)
     curvature = first / mm if not radii else 1.0 / (first * mm) if first else 0.0
-    if refusal := CURVATURE.refuse(curvature):
-        problems.append(f"{where}: the curvature {refusal}")
+    CURVATURE.read(curvature, f"{where}: the curvature", problems)
     most = max((k for k, value in surface.terms.items() if value), default=-1)
     return sequence_row(
         where, problems, before, number=surface.number, stop=surface.stop, curvature=curvature, conic=surface.conic,

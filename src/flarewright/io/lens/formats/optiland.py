@@ -144,8 +144,7 @@ def _shape(where: str, kind: str, geometry: Mapping[str, Any], problems: list[st
             problems.append(f"{where}: {key} is {shorten(value)}, a length was expected")
             return 0.0
         found = 1.0 / value
-        if refusal := CURVATURE.refuse(found):
-            problems.append(f"{where}: the curvature {refusal}")
+        CURVATURE.read(found, f"{where}: the curvature", problems)
         return found
 
     def conic(key: str) -> float:

@@ -327,8 +327,7 @@ def _row(surface: _Surface, mm: float, reading: _Reading) -> SequenceRow | None:
         curvature, conic = 2.0 * square, -1.0
     elif square:
         problems.append(f"{where} has a term of r^2 beside its curvature, which is not supported")
-    if refusal := CURVATURE.refuse(curvature):
-        problems.append(f"{where}: the curvature {refusal}")
+    CURVATURE.read(curvature, f"{where}: the curvature", problems)
     medium = _medium(surface, reading)
     if surface.rim is not None and surface.rim < 0.0:
         problems.append(f"{where}: AP is {surface.rim:g}, a length was expected")

@@ -142,8 +142,7 @@ def _row(
     thickness = _gap(block, found) * mm
     values = _shape(block, mm, found) | {"thickness": thickness, "semi_diameter": _rim(block, mm, found)}
     values["medium"] = None
-    if refusal := CURVATURE.refuse(values.get("curvature", 0.0)):
-        problems.append(f"{where}: the curvature {refusal}")
+    CURVATURE.read(values.get("curvature", 0.0), f"{where}: the curvature", problems)
     if glass:
         values["medium"] = _medium(block.number, glass, found, findings)
     stop, automatic = "STOP" in block.words, _automatic(block)
