@@ -372,14 +372,12 @@ def read_exr_plane(path: str | PathLike[str], choices: Sequence[Sequence[str]], 
         return _plane(*_part_with(_open_parts(path, what), choices))
 
 
-def read_exr_grey(
-    path: str | PathLike[str], choices: Sequence[Sequence[str]], what: str = "an image"
-) -> tuple[Floats, Floats | None]:
+def read_exr_grey(path: str | PathLike[str], choices: Sequence[Sequence[str]]) -> tuple[Floats, Floats | None]:
     """Read a grey picture and its alpha, opening the file once.
 
     Parameters
     ----------
-    path, choices, what
+    path, choices
         As of `read_exr_plane`.
 
     Returns
@@ -392,8 +390,8 @@ def read_exr_grey(
     FileError
         As `read_exr_plane`.
     """
-    with sentences_for(path, what, "give an EXR file"):
-        file = _open_parts(path, what, 16)
+    with sentences_for(path, "an image", "give an EXR file"):
+        file = _open_parts(path, "an image", 16)
         grey = _plane(*_part_with(file, choices))
         part = next((part for part in file.parts if "A" in part.channels), None)
         return grey, None if part is None else _plane(part, ("A",))

@@ -147,7 +147,7 @@ def spread_rays(
     # both halves of a triangle in a row, so that rays are as many places of the pupil as without halves
     triangles = np.stack([few + half * nodes for half in range(halves)], axis=1).reshape(-1, 3)
     chosen: NDArray[np.intp] = choose_representatives(
-        np.concatenate([bundle.pupil] * halves), triangles, passing.ravel(), 1, count
+        np.concatenate([bundle.pupil] * halves), triangles, passing.ravel(), count
     )
     return chosen % nodes, chosen // nodes
 
