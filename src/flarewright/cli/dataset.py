@@ -136,8 +136,7 @@ def _settings(path: Path, seed: int | None) -> DatasetSpec:
         return settings
     if seed >= 2**63:
         raise ProjectError(f"--seed {seed} is too large; choose one below {2**63}")
-    changed: DatasetSpec = settings.replace(seed=seed)
-    return changed
+    return settings.replace(seed=seed)
 
 
 def _preview(

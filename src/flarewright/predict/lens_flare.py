@@ -46,8 +46,7 @@ def luminous(project: Project, quality: Quality) -> Project:
     """
     light = project.lights[0]
     lines = luminous_lines(light.spectrum, quality.wavelengths)
-    same: Project = project.replace(lights=(light.replace(spectrum=lines),), quality=quality)
-    return same
+    return project.replace(lights=(light.replace(spectrum=lines),), quality=quality)
 
 
 def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
@@ -152,8 +151,7 @@ def square_flare(project: Project, quality: Quality, *, threads: int | None = No
 
 
 def _square(project: Project, frame: Frame) -> Camera:
-    square: Camera = project.camera.replace(size_px=(SIDE_PX, SIDE_PX), sensor_mm=(frame.diagonal, frame.diagonal))
-    return square
+    return project.camera.replace(size_px=(SIDE_PX, SIDE_PX), sensor_mm=(frame.diagonal, frame.diagonal))
 
 
 def _turns_by(settled: ResolvedProject) -> float | None:

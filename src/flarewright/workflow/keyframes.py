@@ -123,8 +123,7 @@ def project_at(project: Project, at_s: float) -> Project:
 def still(project: Project) -> Project:
     """Return a project without keyframes and curves: what one frame shows."""
     lights = tuple(light.replace(keyframes=(), motion="linear", curves=()) for light in project.lights)
-    found: Project = project.replace(lights=lights, curves=(), timeline=Timeline())
-    return found
+    return project.replace(lights=lights, curves=(), timeline=Timeline())
 
 
 def is_still(project: Project) -> bool:

@@ -126,8 +126,7 @@ def lights_at_pixels(
     for index, place in places.items():
         light = lights[index]
         lights[index] = light.replace(field_deg=finder.angles_at(light, _shifted(place, counted_px, project)))
-    moved: Project = project.replace(lights=tuple(lights))
-    return moved
+    return project.replace(lights=tuple(lights))
 
 
 def resting_tracks(project: Project, places: Mapping[int, tuple[float, float]]) -> list[tuple[int, Track]]:
@@ -357,8 +356,7 @@ def _moved(light: Light, track: Track, keys: list[LightKey], project: Project, k
     }  # fmt: skip
     if track.diameter_deg > 0.0 and not light.extended:
         changes["diameter_deg"] = track.diameter_deg
-    moved: Light = light.replace(**changes)
-    return moved
+    return light.replace(**changes)
 
 
 def _check_times(track: Track, project: Project) -> None:

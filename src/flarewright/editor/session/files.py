@@ -50,8 +50,7 @@ SUFFIXES: dict[str, str] = {
 def sample_project() -> Project:
     """Return the project of the first start: the picture of the README."""
     base = project_for_lens(SAMPLE)
-    shown: Project = base.replace(lights=(base.lights[0].replace(field_deg=SAMPLE_DEG),))
-    return shown
+    return base.replace(lights=(base.lights[0].replace(field_deg=SAMPLE_DEG),))
 
 
 def project_for_lens(lens: str | Lens) -> Project:

@@ -173,8 +173,7 @@ def _setting(
         elif active.entrance_pupil_diameter is not None:
             changes["entrance_pupil_diameter"] = aperture * mm
     changes |= _field(values, commands, stated)
-    setting: Configuration = active.replace(**changes)
-    return setting
+    return active.replace(**changes)
 
 
 def _field(values: Mapping[Place, float], commands: Commands, stated: Stated) -> dict[str, float | None]:

@@ -211,8 +211,7 @@ def _iris(table: dict[str, Any], folder: Path | None) -> Iris:
     iris = Iris.model_validate({k: v for k, v in table.items() if k in Iris.model_fields}, strict=True)
     if iris.mask is None:
         return iris
-    found: Iris = iris.replace(mask=str(((folder or Path()) / iris.mask).absolute()))
-    return found
+    return iris.replace(mask=str(((folder or Path()) / iris.mask).absolute()))
 
 
 def _rows(

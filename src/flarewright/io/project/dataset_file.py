@@ -168,8 +168,7 @@ def _resolved(spec: DatasetSpec, folder: Path) -> DatasetSpec:
     coating = spec.lens.coating.replace(choice=tuple(map(file, spec.lens.coating.choice)))
     splits = {name: place(part) for name, part in spec.splits if isinstance(part, tuple)}
     lens = spec.lens.replace(names=names, coating=coating)
-    found: DatasetSpec = spec.replace(lens=lens, splits=spec.splits.replace(**splits))
-    return found
+    return spec.replace(lens=lens, splits=spec.splits.replace(**splits))
 
 
 def _text_problems(spec: DatasetSpec, folder: Path) -> list[str]:

@@ -51,8 +51,7 @@ def make_upright(folder: Path, run: MergedRun, tell: Progress) -> MergedRun:
         infos.append(here)
         tell((k + 1) / len(run.frames), f"upright {k + 1} of {len(run.frames)}")
     reported = "frames were turned upright (--upright): neighbouring pixels share some of their noise"
-    out: MergedRun = run.replace(frames=tuple(infos), remarks=(*run.remarks, reported))
-    return out
+    return run.replace(frames=tuple(infos), remarks=(*run.remarks, reported))
 
 
 def _turned_upright(frame: MergedFrame) -> MergedFrame:

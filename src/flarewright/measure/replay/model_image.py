@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import lru_cache
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 
@@ -292,7 +292,7 @@ def _single(
     for ghost, there in zip(model.ghosts, _there(model, model.ghosts, constellation_deg), strict=True):
         if not there:
             continue
-        alone = cast(GhostModel, bare.replace(ghosts=(ghost,)))
+        alone = bare.replace(ghosts=(ghost,))
         pixels = draw(alone, constellation_deg, roll_deg, size) * gain
         # rows are sums of differences, whose rounding leaves values where there is no light
         lit = np.argwhere((pixels > _ROUNDING * gain * _most_light(ghost)).any(axis=2))

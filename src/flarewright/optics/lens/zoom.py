@@ -41,8 +41,7 @@ def at_position(lens: Lens, position: Position) -> Lens:
         # a position without a distance then means infinity, whatever the focus of the rows
         changes["focus_distance"] = position.focus_distance
     changes["stated_focal_length"] = position.focal_length
-    found: Lens = lens.replace(**changes)
-    return found
+    return lens.replace(**changes)
 
 
 def positioned(lens: Lens, zoom: str | float | None, distance: float | None) -> Lens:
@@ -141,8 +140,7 @@ def _focused(lens: Lens, setting: Sequence[Position], distance: float | None) ->
     for one, other in pairwise(setting):
         if near <= _nearness(other) * (1.0 + 1e-9):
             part = (near - _nearness(one)) / (_nearness(other) - _nearness(one))
-            found: Position = _interpolated_position(lens, one, other, part).replace(focus_distance=distance)
-            return found
+            return _interpolated_position(lens, one, other, part).replace(focus_distance=distance)
     return setting[0]
 
 
@@ -163,8 +161,7 @@ def _between(lens: Lens, focal_length: float, distance: float | None) -> Positio
         if number <= above:
             part = _part(lens, settings[a][0], settings[b][0], number)
             one, other = _focused(lens, settings[a], distance), _focused(lens, settings[b], distance)
-            met: Position = _interpolated_position(lens, one, other, part).replace(focal_length=number)
-            return met
+            return _interpolated_position(lens, one, other, part).replace(focal_length=number)
     return _focused(lens, settings[0], distance)
 
 

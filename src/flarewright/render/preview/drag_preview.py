@@ -204,8 +204,7 @@ def _has_fixed_patterns(project: Project) -> bool:
 
 def _scene(project: Project, light: Light) -> Project:
     placed = Light(field_deg=(0.0, 0.0), spectrum=light.spectrum, diameter_deg=light.diameter_deg)
-    scene: Project = project.replace(lights=(placed,), art=Art(physical=project.art.physical), design=None)
-    return scene
+    return project.replace(lights=(placed,), art=Art(physical=project.art.physical), design=None)
 
 
 def _strength(lens: Lens, shot: Shot, image: DirectImage) -> Floats:

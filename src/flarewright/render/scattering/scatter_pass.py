@@ -78,7 +78,7 @@ def chosen_scatter(settled: ResolvedProject) -> Scatter | None:
     if reported is None and settled.project.filter is not None and chosen.rows:
         # the lens file numbers its rows without those of the filter
         moved = tuple(exception.replace(row=exception.row + FILTER_ROWS) for exception in chosen.rows)
-        return chosen.replace(rows=moved)  # type: ignore[no-any-return]
+        return chosen.replace(rows=moved)
     return chosen
 
 

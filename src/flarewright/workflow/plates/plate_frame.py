@@ -84,8 +84,7 @@ def with_radiances(project: Project) -> Project:
         )
     factor = plate_optics(project)[1]
     lights = tuple(light.replace(intensity=light.intensity * factor) for light in project.lights)
-    found: Project = project.replace(lights=lights)
-    return found
+    return project.replace(lights=lights)
 
 
 def plate_optics(project: Project) -> tuple[FieldMap, float]:
