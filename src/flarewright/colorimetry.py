@@ -53,5 +53,4 @@ def rgb_to_xyz(primaries: Sequence[float]) -> Floats:
         xyz = matrix @ rgb (SMPTE RP 177).
     """
     P = np.stack([xyz_of(primaries[k : k + 2]) for k in (0, 2, 4)], axis=1)
-    scaled: Floats = P * np.linalg.solve(P, xyz_of(primaries[6:]))
-    return scaled
+    return P * np.linalg.solve(P, xyz_of(primaries[6:]))

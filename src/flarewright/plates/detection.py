@@ -94,8 +94,7 @@ class Sources:
 
 def plate_luminance(pixels: Pixels) -> Pixels:
     """Return the luminance of linear Rec.709 pixels, negative values as 0, shape (H, W)."""
-    found: Pixels = np.maximum(pixels, 0.0) @ LUMINANCE.astype(np.float32)
-    return found
+    return np.maximum(pixels, 0.0) @ LUMINANCE.astype(np.float32)
 
 
 def mean_luminance(pixels: Pixels) -> float:

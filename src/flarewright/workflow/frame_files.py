@@ -33,8 +33,7 @@ def with_frame_files(project: Project, frame: float) -> Project:
             light if light.holdout is None else light.replace(holdout=_numbered(light.holdout, number))
             for light in project.lights
         )
-    found: Project = project.replace(**changes) if changes else project
-    return found
+    return project.replace(**changes) if changes else project
 
 
 def _numbered(holdout: Any, frame: int) -> Any:

@@ -74,8 +74,7 @@ def light_at(light: Light, at_s: float) -> Light:
                 changes["spectrum"] = Rgb(rgb=found)
             case "temperature_k":
                 changes["spectrum"] = BlackBody(temperature_k=found)
-    placed: Light = light.replace(**changes) if changes else light
-    return placed
+    return light.replace(**changes) if changes else light
 
 
 def project_at(project: Project, at_s: float) -> Project:

@@ -69,8 +69,7 @@ def linear_pixels(codes: np.ndarray, coding: FilmCoding, transfer: Transfer | No
     linear = decoded(signal_of(codes, coding), transfer or coding.transfer)
     if coding.primaries == "bt709":
         return linear
-    found: Pixels = linear @ to_rec709(coding.primaries).T
-    return found
+    return linear @ to_rec709(coding.primaries).T
 
 
 def signal_of(codes: np.ndarray, coding: FilmCoding) -> Pixels:
@@ -112,5 +111,4 @@ def signal_of(codes: np.ndarray, coding: FilmCoding) -> Pixels:
 def to_rec709(primaries: str) -> Pixels:
     """Return the matrix from linear light of some primaries to Rec.709, shape (3, 3), float32."""
     to_xyz = rgb_to_xyz(PRIMARIES[primaries])
-    found: Pixels = (np.linalg.inv(rgb_to_xyz(PRIMARIES["bt709"])) @ to_xyz).astype(np.float32)
-    return found
+    return (np.linalg.inv(rgb_to_xyz(PRIMARIES["bt709"])) @ to_xyz).astype(np.float32)

@@ -190,5 +190,4 @@ def _bilinear(picture: Floats, u: Floats, v: Floats) -> Floats:
     a, b = u - i, v - j
     top = picture[j, i] * (1 - a) + picture[j, i + 1] * a
     bottom = picture[j + 1, i] * (1 - a) + picture[j + 1, i + 1] * a
-    mixed: Floats = top * (1 - b) + bottom * b
-    return mixed
+    return top * (1 - b) + bottom * b

@@ -249,8 +249,7 @@ class MergedFrame:
     @property
     def valid(self) -> Mask:
         """Where `radiance` was measured, shape (height, width, 3)."""
-        valid: Mask = np.isfinite(self.variance)
-        return valid
+        return np.isfinite(self.variance)
 
     @property
     def constellation_deg(self) -> float:

@@ -250,8 +250,7 @@ def _check(
 
 def _cos_squared(n0: Floats, n: Floats | float, c0: Floats) -> Floats:
     """Return cos^2 in the medium n by Snell's law, negative beyond the critical angle; exact for n = n0 at grazing."""
-    c2: Floats = ((n - n0) * (n + n0) + (n0 * c0) ** 2) / (n * n)
-    return c2
+    return ((n - n0) * (n + n0) + (n0 * c0) ** 2) / (n * n)
 
 
 def _cos_and_sinc(x: Floats) -> tuple[Floats, Floats, Floats]:

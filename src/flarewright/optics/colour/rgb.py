@@ -76,8 +76,7 @@ def adapted_to_rgb_matrix(primaries: Sequence[float]) -> Floats:
     -----
     As `xyz_to_rgb_matrix`.
     """
-    matrix: Floats = np.linalg.inv(rgb_to_xyz(primaries)) @ _bradford(D65_WHITE, primaries[6:])
-    return matrix
+    return np.linalg.inv(rgb_to_xyz(primaries)) @ _bradford(D65_WHITE, primaries[6:])
 
 
 def _bradford(source: Sequence[float], target: Sequence[float]) -> Floats:

@@ -40,8 +40,7 @@ def smoothest_reflectance(coefficients: tuple[float, float, float], wavelength_n
     u = (np.asarray(wavelength_nm, dtype=np.float64) - 580.0) / 200.0
     c0, c1, c2 = coefficients
     x = (c0 * u + c1) * u + c2
-    curve: Floats = 0.5 + 0.5 * x / np.sqrt(1.0 + x * x)
-    return curve
+    return 0.5 + 0.5 * x / np.sqrt(1.0 + x * x)
 
 
 @lru_cache(maxsize=1024)

@@ -34,8 +34,7 @@ def planck(wavelength_nm: ArrayLike, temperature_k: float) -> Floats:
         W / (m^2 sr nm), the shape of `wavelength_nm`.
     """
     lam = np.asarray(wavelength_nm, dtype=np.float64) * 1e-9
-    radiance: Floats = 2e-9 * _H * _C**2 / lam**5 / np.expm1(_H * _C / (lam * _KB * temperature_k))
-    return radiance
+    return 2e-9 * _H * _C**2 / lam**5 / np.expm1(_H * _C / (lam * _KB * temperature_k))
 
 
 def spectral_power(spectrum: Spectrum, wavelength_nm: ArrayLike) -> Floats:
@@ -107,8 +106,7 @@ def traced_wavelengths(count: int, spectrum: Spectrum | None = None) -> Floats:
             return lines
     if count == 3:
         return np.array([450.0, 540.0, 610.0])
-    midpoints: Floats = 395.0 + 310.0 * (np.arange(count) + 0.5) / count
-    return midpoints
+    return 395.0 + 310.0 * (np.arange(count) + 0.5) / count
 
 
 def sampled_wavelengths(count: int, spectrum: Spectrum | None = None) -> Floats:
@@ -132,8 +130,7 @@ def sampled_wavelengths(count: int, spectrum: Spectrum | None = None) -> Floats:
         lines = traced_wavelengths(cells, spectrum)
         if covers_all_lines(spectrum, lines):
             return lines
-    midpoints: Floats = low + (high - low) * (np.arange(cells) + 0.5) / cells
-    return midpoints
+    return low + (high - low) * (np.arange(cells) + 0.5) / cells
 
 
 def covers_all_lines(spectrum: Spectrum, wavelengths_nm: ArrayLike) -> bool:
@@ -226,8 +223,7 @@ def band_weights(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colo
     ghost's brightness is smooth in wavelength. Lines are split between their two neighbours.
     """
     wave, xyz = _stimulus(spectrum)
-    weights: Floats = hats(wave, wavelengths_nm) @ xyz @ xyz_to_rgb_matrix(colorspace).T
-    return weights
+    return hats(wave, wavelengths_nm) @ xyz @ xyz_to_rgb_matrix(colorspace).T
 
 
 def band_parts(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colorspace, curve_nm: ArrayLike) -> Floats:

@@ -384,8 +384,7 @@ def _measured_fans(P: Floats, s: Floats, reach: float) -> FanWings:
 
 def _ring_window(t: Floats) -> Floats:
     """Return a window that is 0 at a quarter and at 1, symmetric in the logarithm between."""
-    window: Floats = np.sin(0.5 * math.pi * np.log2(4.0 * t)) ** 2
-    return window
+    return np.sin(0.5 * math.pi * np.log2(4.0 * t)) ** 2
 
 
 def spike_profile(

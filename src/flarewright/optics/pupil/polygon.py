@@ -79,8 +79,7 @@ def content(border: Floats) -> float:
 def centroid(border: Floats) -> Floats:
     """Return the centroid of a shape's brightness, shape (2,)."""
     weight = _cross(border) * border[:, WEIGHT]
-    middle: Floats = weight @ (border[:, START] + border[:, END]) / (6.0 * content(border))
-    return middle
+    return weight @ (border[:, START] + border[:, END]) / (6.0 * content(border))
 
 
 def rim(border: Floats) -> float:

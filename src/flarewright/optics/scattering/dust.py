@@ -67,8 +67,7 @@ def dust_density(v: ArrayLike, wavelength_nm: float, level: float) -> Floats:
         density[m] = (number * np.exp(np.interp(at, sizes, spread[:, m]))).sum() / k2
     smooth = _smoothed(np.log(nodes), np.log(density))
     place = np.log(np.clip(np.asarray(v, dtype=np.float64), nodes[0], nodes[-1]))
-    found: Floats = np.exp(np.interp(place, np.log(nodes), smooth))
-    return found
+    return np.exp(np.interp(place, np.log(nodes), smooth))
 
 
 @lru_cache(maxsize=1)

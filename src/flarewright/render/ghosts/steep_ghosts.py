@@ -343,8 +343,7 @@ def within_gaps(fine_nm: Floats, gaps: Mask) -> NDArray[np.intp]:
     gaps : ndarray, shape (M - 1,), bool
     """
     inner, gap = _inner_wavelengths(tuple(fine_nm))
-    found: NDArray[np.intp] = inner[gaps[gap]]
-    return found
+    return inner[gaps[gap]]
 
 
 @lru_cache(maxsize=64)

@@ -245,8 +245,7 @@ def _at_all(wavelengths_nm: Floats, chosen: NDArray[np.intp], light: Floats) -> 
     t = np.log(wavelengths_nm)
     weights = np.array([[np.prod([(at - t[m]) / (t[k] - t[m]) for m in chosen if m != k]) for k in chosen] for at in t])
     lit = (light > 0.0).all(axis=0)
-    found: Floats = np.where(lit, np.exp(weights @ np.log(np.where(lit, light, 1.0))), 0.0)
-    return found
+    return np.where(lit, np.exp(weights @ np.log(np.where(lit, light, 1.0))), 0.0)
 
 
 def _nodes(shot: Shot, centre: Floats, sampling: Sampling) -> tuple[Floats, Floats, bool]:
