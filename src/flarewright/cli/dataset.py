@@ -140,12 +140,7 @@ def _settings(path: Path, seed: int | None) -> DatasetSpec:
 
 
 def _preview(
-    settings: DatasetSpec,
-    preview: Path,
-    spec: Path,
-    items: int | None,
-    threads: int | None,
-    as_json: bool,
+    settings: DatasetSpec, preview: Path, spec: Path, items: int | None, threads: int | None, as_json: bool
 ) -> None:
     """Write a contact sheet."""
     from ..io.images.png import write_png

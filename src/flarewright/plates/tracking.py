@@ -76,10 +76,7 @@ class Tracks:
 
 
 def follow(
-    frames: Sequence[int],
-    found: Sequence[Sources],
-    width_px: int,
-    settings: TrackingSettings | None = None,
+    frames: Sequence[int], found: Sequence[Sources], width_px: int, settings: TrackingSettings | None = None
 ) -> Tracks:
     """Match the sources of neighbouring frames.
 

@@ -118,10 +118,7 @@ def build_project(flags: RenderOptions) -> Project:
     if flags.ghost_offset is not None:
         # on its own it shifts ghosts only: the lens is as designed
         nothing = {"seed": flags.seed or 0, "decentre_um": 0.0, "tilt_arcmin": 0.0}
-        fields["imperfection"] = {
-            **dict(fields.get("imperfection") or nothing),
-            "ghost_offset_mm": flags.ghost_offset,
-        }
+        fields["imperfection"] = {**dict(fields.get("imperfection") or nothing), "ghost_offset_mm": flags.ghost_offset}
     if (iris := _iris(flags, fields["lens"], base)) is not None:
         fields["iris"] = iris
     for section, changes in _sections(flags).items():

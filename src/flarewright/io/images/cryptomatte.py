@@ -101,10 +101,7 @@ def matte_layers(matte: GhostMatte) -> tuple[tuple[str, Pixels], ...]:
     values: NDArray[np.float32] = bits.view(np.float32)[matte.objects]
     coverage = matte.coverage
     return tuple(
-        (
-            f"{NAME}{k:02d}",
-            np.stack([values[2 * k], coverage[2 * k], values[2 * k + 1], coverage[2 * k + 1]], axis=-1),
-        )
+        (f"{NAME}{k:02d}", np.stack([values[2 * k], coverage[2 * k], values[2 * k + 1], coverage[2 * k + 1]], axis=-1))
         for k in range(len(values) // 2)
     )
 

@@ -201,10 +201,7 @@ def _depth(image: Any) -> int:
 
 def _tiff(path: Path, transfer: Transfer | None) -> PlatePicture:
     tifffile = optional("tifffile", "photo", f"reading {shown(path)}")
-    with (
-        outside(path, "a plate", remedy="save it as EXR or 16-bit TIFF") as stream,
-        tifffile.TiffFile(stream) as file,
-    ):
+    with outside(path, "a plate", remedy="save it as EXR or 16-bit TIFF") as stream, tifffile.TiffFile(stream) as file:
         page = file.pages[0]
         shape, size = tuple(page.shape), np.dtype(page.dtype).itemsize
         # the values, and linear pixels

@@ -87,11 +87,7 @@ ROW_NUMBERS = {
 RADIUS = NumberField('radius of curvature or "flat"; positive: the centre lies behind the vertex', -1e9, 1e9)
 CURVATURE = NumberField("1 / radius, instead of `radius`; 0 is flat", -1e3, 1e3, unit="1/mm")
 
-TOP_TEXTS = {
-    "name": "name of the lens",
-    "source": "origin of the numbers, such as the patent",
-    "notes": "observations",
-}
+TOP_TEXTS = {"name": "name of the lens", "source": "origin of the numbers, such as the patent", "notes": "observations"}
 
 TOP_KEYS = (
     "schema_version",

@@ -35,16 +35,7 @@ from . import media
 from .coating_text import coating_from
 from .foreign_file import MOST_SURFACES
 from .formats import codev, dotlens, optiland, oslo, realflare, tables
-from .lens_fields import (
-    CURVATURE,
-    RADIUS,
-    ROW_NUMBERS,
-    STOP_KEYS,
-    SURFACE_KEYS,
-    TOP_KEYS,
-    TOP_NUMBERS,
-    TOP_TEXTS,
-)
+from .lens_fields import CURVATURE, RADIUS, ROW_NUMBERS, STOP_KEYS, SURFACE_KEYS, TOP_KEYS, TOP_NUMBERS, TOP_TEXTS
 from .scatter_text import read_scatter
 from .shape_fields import read_elements, read_positions, read_shape, unknown_keys
 from .zemax import reader as zemax
@@ -277,11 +268,7 @@ def _stop(entry: dict[str, Any], k: int, problems: list[str]) -> Stop | None:
 
 
 def _surface(
-    entry: dict[str, Any],
-    k: int,
-    problems: list[str],
-    findings: list[tuple[int, media.Finding]],
-    folder: Path | None,
+    entry: dict[str, Any], k: int, problems: list[str], findings: list[tuple[int, media.Finding]], folder: Path | None
 ) -> Surface | None:
     before = len(problems)
     unknown_keys(entry, ("stop", *SURFACE_KEYS), f"row {k}: ", problems)

@@ -19,14 +19,7 @@ from ..files.sentences import shorten, summary
 from ..files.text_file import check_version
 from ..files.type_slips import record_of
 from .file_of_kind import read_file_of_kind
-from .project_file import (
-    Sections,
-    accept_text,
-    expand_coating,
-    expand_light,
-    lens_location,
-    validation_messages,
-)
+from .project_file import Sections, accept_text, expand_coating, expand_light, lens_location, validation_messages
 from .project_text import ABOUT
 
 _NEWEST = 1

@@ -41,11 +41,7 @@ def track_format(text: str) -> TrackFormat:
 
 
 def read_tracks(
-    path: str | Path,
-    form: TrackFormat | None = None,
-    *,
-    origin: Origin | None = None,
-    first_frame: int = 1,
+    path: str | Path, form: TrackFormat | None = None, *, origin: Origin | None = None, first_frame: int = 1
 ) -> TrackFile:
     r"""Read the tracks of a file.
 

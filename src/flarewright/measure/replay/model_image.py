@@ -43,10 +43,7 @@ def light_px(model: GhostModel, constellation_deg: float, roll_deg: float = 0.0)
     t = float(np.tan(np.radians(constellation_deg)))
     reach = model.focal_px * t * (1.0 + model.distortion * t * t)
     turn = np.radians(roll_deg)
-    return (
-        model.axis_px[0] + reach * float(np.cos(turn)),
-        model.axis_px[1] - reach * float(np.sin(turn)),
-    )
+    return (model.axis_px[0] + reach * float(np.cos(turn)), model.axis_px[1] - reach * float(np.sin(turn)))
 
 
 def replay_model(

@@ -208,11 +208,7 @@ def _outline(layer: Layer, size: tuple[int, int]) -> tuple[Indices, Indices]:
 
 
 def _free_place(
-    x: Indices,
-    y: Indices,
-    layer: Layer,
-    taken: Sequence[tuple[float, float]],
-    size: tuple[int, int],
+    x: Indices, y: Indices, layer: Layer, taken: Sequence[tuple[float, float]], size: tuple[int, int]
 ) -> tuple[float, float]:
     """Return a position for a ghost's name: just outside its outline and away from other names."""
     left, top, wide, high = layer.window

@@ -112,10 +112,7 @@ class Polygon(Frozen):
     corners_deg: tuple[tuple[float, float], ...] = Field(min_length=3, max_length=256)
 
 
-FieldAngles = tuple[
-    Annotated[float, Field(gt=-90.0, lt=90.0)],
-    Annotated[float, Field(gt=-90.0, lt=90.0)],
-]
+FieldAngles = tuple[Annotated[float, Field(gt=-90.0, lt=90.0)], Annotated[float, Field(gt=-90.0, lt=90.0)]]
 
 Shape = Annotated[Rectangle | Polygon, Field(discriminator="kind")]
 

@@ -388,11 +388,7 @@ def _ring_window(t: Floats) -> Floats:
 
 
 def spike_profile(
-    wings: BladeWings,
-    wavelengths_nm: Floats,
-    weights: Floats,
-    f_number: float,
-    pixel_mm: tuple[float, float],
+    wings: BladeWings, wavelengths_nm: Floats, weights: Floats, f_number: float, pixel_mm: tuple[float, float]
 ) -> SpikeProfile:
     """Return the profile across the spikes of straight blades, summed over wavelengths and averaged over a pixel.
 

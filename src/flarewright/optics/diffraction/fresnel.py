@@ -16,14 +16,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernels.diffraction.fresnel import (
-    BandAreas,
-    FrequencyLimits,
-    PhaseTables,
-    sharpen,
-    sum_turns,
-    turn_frequencies,
-)
+from ...kernels.diffraction.fresnel import BandAreas, FrequencyLimits, PhaseTables, sharpen, sum_turns, turn_frequencies
 from ...typing import Floats, Pixels
 from .fft_size import fast_size
 

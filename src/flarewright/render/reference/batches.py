@@ -233,12 +233,7 @@ def _points_within(border: Floats, count: int, rng: np.random.Generator) -> Floa
 
 
 def run_batch(
-    sources: Sequence[RaySource],
-    batch: int,
-    *,
-    picture: bool,
-    fours: int = 0,
-    cameras: Sequence[CameraSource] = (),
+    sources: Sequence[RaySource], batch: int, *, picture: bool, fours: int = 0, cameras: Sequence[CameraSource] = ()
 ) -> Batch:
     """Trace one batch of every light.
 
