@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, StrictBool, field_validator, model_validator
+from pydantic import AfterValidator, Field, StrictBool, field_validator, model_validator
 
 from ...errors import ProjectError
 from ..base import Frozen
@@ -250,7 +250,7 @@ class Project(Frozen):
     holdout: Holdout | None = None
     art: Art = Art()
     design: Design | None = None
-    curves: tuple[ProjectCurve, ...] = ()
+    curves: Annotated[tuple[ProjectCurve, ...], AfterValidator(one_curve_each)] = ()
     timeline: Timeline = Timeline()
     plate: Backplate | None = None
 
@@ -268,12 +268,6 @@ class Project(Frozen):
                 f"{', '.join(STANDARD_NAMES)}, or flarewright.parse_coating_choice({coating!r}) for others"
             )
         return everywhere(coating)
-
-    @field_validator("curves")
-    @classmethod
-    def _one_curve_each(cls, curves: tuple[ProjectCurve, ...]) -> tuple[ProjectCurve, ...]:
-        one_curve_each(curves)
-        return curves
 
     @field_validator("zoom")
     @classmethod
