@@ -68,12 +68,6 @@ class Check:
     predicted: Floats
     rendered: Floats
 
-    @property
-    def ratio(self) -> Floats:
-        """Predicted over rendered, shape (M, 5); NaN where the render is black."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(np.where(self.rendered > 0.0, self.predicted / self.rendered, np.nan))
-
 
 def interpolated_statistics(a: Floats, b: Floats, part: float) -> Floats:
     """Interpolate statistics linearly in their logarithms, and linearly in the values at discontinuities.

@@ -84,11 +84,6 @@ class LightFinder:
             self._images[key] = direct_images(self._settled, light)
         return field_angles_at(self._images[key], place_px, near_deg)
 
-    @property
-    def efl_mm(self) -> float | None:
-        """Focal length of the lens; None for a measured flare."""
-        return None if self._settled is None else self._settled.order.efl
-
 
 def lights_at_pixels(
     project: Project, places: Mapping[int, tuple[float, float]], counted_px: tuple[int, int] | None = None

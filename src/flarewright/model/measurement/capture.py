@@ -270,8 +270,3 @@ class MergedFrame:
     def axis_px(self) -> tuple[float, float]:
         """(x, y) of the optical axis."""
         return self.info.axis_px
-
-    @property
-    def horizon_deg(self) -> float:
-        """Measured minus nominal roll, degrees, counter-clockwise."""
-        return self.info.horizon_deg
