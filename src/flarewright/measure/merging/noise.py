@@ -40,10 +40,6 @@ class Noise:
     slope: float
     floor: float
 
-    def variance(self, units: NDArray[np.floating]) -> NDArray[np.floating]:
-        """Return the variance of values above black with mean `units`."""
-        return np.asarray(np.maximum(units, 0.0) * self.slope + self.floor)
-
 
 def noise_of(camera: CameraNoise, iso: float, step: float) -> Noise:
     """Return the noise at an ISO.
