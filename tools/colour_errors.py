@@ -2,6 +2,7 @@
 
     python tools/colour_errors.py ghosts [--mode draft] [--scenes known]   # one row a lens, one column a light
     python tools/colour_errors.py pictures   # whole pictures in daylight; needs colour-science (.[dev])
+    python tools/colour_errors.py sums       # all ghosts of a Flektogon at f/8, by number of wavelengths and quality
 
 The tables of docs/colour.md. Ghosts with more than a thousandth of the brightest one's light are compared by their sums
 per channel in pictures of 240 x 135 pixels.
@@ -398,10 +399,41 @@ def pictures(scenes: Sequence[Scene]) -> None:
             print(f"| {word} | {np.median(far):.2f} | {np.quantile(far, 0.99):.2f} |", flush=True)
 
 
+def sums() -> None:
+    """Print the light of all ghosts of a Flektogon with broadband films in daylight, as parts of that of 61 lines."""
+
+    def whole(spectrum: Spectrum, count: int, mode: str) -> Floats:
+        project = project_of(SCENES["known"][0], spectrum, count, mode, "passes")
+        if mode == "reference":
+            project = project.replace(quality=Quality(mode="reference", reference_error=0.005))
+        ghosts = [layer for layer in render(project).layers if layer.name == "ghosts"]
+        found: Floats = ghosts[0].pixels.astype(np.float64).sum(axis=(0, 1))
+        return found
+
+    def of_lines(count: int) -> Floats:
+        nm = np.linspace(*VISIBLE_NM, count)
+        power = spectral_power(D65(), nm)
+        light, total = cie_1931(nm)[:, 1] * power, np.zeros(3)
+        # a project has at most 81 wavelengths
+        for k in range(2):
+            some = Lines(lines=tuple(zip(nm[k::2].tolist(), power[k::2].tolist(), strict=True)))
+            total += light[k::2].sum() / light.sum() * whole(some, len(some.lines), "final")
+        return total
+
+    exact = of_lines(61)
+    rows = [
+        ("31 exact lines", of_lines(31)), *((f"{n} wavelengths", whole(D65(), n, "final")) for n in (3, 7, 15, 31)),
+        ("draft, 3 wavelengths", whole(D65(), 3, "draft")), ("reference", whole(D65(), 7, "reference")),
+    ]  # fmt: skip
+    print("| method | red | green | blue |\n|---|---|---|---|")
+    for name, found in rows:
+        print(f"| {name} | " + " | ".join(f"{one:.3f}" for one in found / exact) + " |", flush=True)
+
+
 def main() -> int:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("ghosts", "pictures"), nargs="?", default="ghosts")
+    parser.add_argument("what", choices=("ghosts", "pictures", "sums"), nargs="?", default="ghosts")
     parser.add_argument("--mode", choices=("draft", "final"), default="draft")
     parser.add_argument("--scenes", choices=tuple(SCENES), default="known")
     parser.add_argument("--lights", nargs="+", choices=tuple(LIGHTS), default=list(LIGHTS))
@@ -410,6 +442,8 @@ def main() -> int:
     scenes = SCENES[given.scenes] if given.only is None else [SCENES[given.scenes][k] for k in given.only]
     if given.what == "pictures":
         pictures(scenes)
+    elif given.what == "sums":
+        sums()
     else:
         ghosts(given.mode, scenes, given.lights)
     return 0

@@ -297,6 +297,20 @@ def test_what_stops_a_render_is_one_sentence_and_leaves_nothing(capsys, monkeypa
     assert list(folder.iterdir()) == []
 
 
+def test_a_module_in_c_that_a_signal_ends_is_an_interruption(capsys, monkeypatch, folder):
+    """Numba's reports "failed to import" instead of the KeyboardInterrupt."""
+
+    def stop(*args, **kwargs):
+        raise ImportError("numba._devicearray failed to import")
+
+    monkeypatch.setattr("flarewright.render.render.render", stop)
+    words = ("render", "heliar-tronnier", "--light", "1,1", "-o", "a.exr")
+    with pytest.raises(ImportError):
+        call(capsys, *words)
+    monkeypatch.setattr("flarewright.cli.common._received", [15])
+    assert "interrupted; nothing was left" in call(capsys, *words, code=130).err
+
+
 def test_a_call_that_fails_without_a_reason_lacks_memory_only_where_none_is_left(capsys, monkeypatch, folder):
     """The interpreter's own word for a call from C that failed without setting an error."""
     resource = pytest.importorskip("resource", reason="limits of a process need a POSIX system")

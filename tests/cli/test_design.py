@@ -11,7 +11,7 @@ import pytest
 
 from flarewright import __version__
 from flarewright.cli.app import run
-from flarewright.cli.common import checkpoints, end_as_interrupted, stop_on_interrupt
+from flarewright.cli.common import checkpoints, end_as_interrupted, stop_on_interrupt, was_interrupted
 from flarewright.design.results import report
 from flarewright.design.solvers import pool_search
 from flarewright.design.thesis import benchmark as thesis
@@ -178,6 +178,10 @@ def test_an_unreachable_limit_is_reported_and_the_nearest_are_written(folder, ca
         (["solve", "shot.toml", "-o", "x", "--time", "nan"], "seconds above 0"),
         (["solve", "shot.toml", "-o", "x", "--seed", "-1"], "'--seed'"),
         (["solve", "shot.toml", "-o", "x", "--lenses", "0"], "'--lenses'"),
+        (["solve", "shot.toml", "-o", "x", "--restarts", "0"], "'--restarts'"),
+        (["solve", "shot.toml", "-o", "x", "--cluster", "local:2"], "there is one: start with --restarts 8, or omit"),
+        (["solve", "shot.toml", "-o", "x", "--processes", "2"], "--processes 2 shares out independent searches"),
+        (["solve", "shot.toml", "-o", "x", "--restarts", "2", "--cluster", "farm"], "cluster 'farm' is unknown"),
         (["solve", "axis.toml", "-o", "x"], "light on the axis"),
         (["solve", "wish.toml", "-o", "x"], "place_mm"),
         (["solve", "bounds.toml", "-o", "x"], "design.bounds"),
@@ -293,6 +297,25 @@ def test_an_ended_and_a_killed_search_resume_to_the_same_lenses(folder, plain, r
     assert made(folder / "killed") == whole
 
 
+def test_restarts_in_turn_resume_to_the_same_lenses(folder, plain, rounds, capsys):
+    words = ["--restarts", "3", "--processes", "1", *SEARCH]
+    assert run(["design", "solve", "shot.toml", "-o", "whole", *words]) == 0
+    whole = made(folder / "whole")
+    assert (whole[1]["restarts"], whole[1]["runs"]) == (3, [])
+    rounds += [*[nothing] * 9, lambda: signal.raise_signal(signal.SIGTERM)]
+    capsys.readouterr()
+    assert run(["design", "solve", "shot.toml", "-o", "cut", *words]) == 0
+    assert "ended early; to resume: flarewright design resume cut\n" in capsys.readouterr().err
+    assert made(folder / "cut")[1]["searches"] < whole[1]["searches"]
+    assert run(["design", "resume", "cut", "--processes", "1", *SEARCH]) == 0
+    assert "2 of 3 searches go on where they were" in capsys.readouterr().err
+    assert made(folder / "cut") == whole
+    # without its state another search would take over these restarts
+    (folder / "cut" / "search.json").unlink()
+    assert run(["design", "solve", "shot.toml", "-o", "cut", *words]) == 2
+    assert "holds searches of an earlier command; choose another folder" in capsys.readouterr().err
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
 def test_a_signal_after_the_work_ends_the_process_without_a_word():
     """As `python -m flarewright`."""
@@ -320,6 +343,7 @@ def test_signals_that_end_a_search(name):
 
 
 def test_signals_that_end_a_command(monkeypatch):
+    monkeypatch.setattr("flarewright.cli.common._received", [])
     kinds = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = [signal.signal(one, signal.SIG_DFL) for one in kinds]
     try:
@@ -329,6 +353,7 @@ def test_signals_that_end_a_command(monkeypatch):
         assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGTERM)
+        assert was_interrupted()
     finally:
         for one, handler in zip(kinds, before, strict=True):
             signal.signal(one, handler)

@@ -77,6 +77,22 @@ def test_processes_end_with_their_parent_even_if_it_is_killed(tmp_path):
     assert wait_for(lambda: not any(alive(worker) for worker in workers))
 
 
+@posix
+def test_what_watches_can_end_the_work(tmp_path):
+    class EnoughError(Exception):
+        pass
+
+    def watch():
+        if len(list(tmp_path.iterdir())) == 2:
+            raise EnoughError
+
+    with pytest.raises(EnoughError):
+        list(work_off("shared_work:mark", str(tmp_path), range(4), processes=2, watch=watch))
+    workers = [int(path.suffix[1:]) for path in tmp_path.iterdir()]
+    assert len(workers) == 2
+    assert not any(alive(worker) for worker in workers)
+
+
 def test_shares_never_oversubscribe():
     for items in (1, 3, 100):
         for threads in (1, 2, 7, 16):

@@ -37,6 +37,7 @@ from flarewright.optics.lens.paths import ghost_paths
 from flarewright.render.ghosts.paraxial_ghosts import draw_draft
 from flarewright.render.ghosts.traced_ghosts import draw_final, find_final
 from flarewright.render.image.canvas import blank, merge
+from flarewright.render.image.display import view
 from flarewright.render.reference import estimator
 from flarewright.render.render import render
 from flarewright.render.scene.opening import make_opening
@@ -408,3 +409,34 @@ def test_the_reference_agrees_in_every_channel(side, batches, seeds, monkeypatch
 @pytest.mark.parametrize("case", ["triplet", "tessar", "biotar"])
 def test_the_reference_agrees_closely(case):
     assert np.abs(z_of(case, 8, 24 * 128**2)).max() < 4.0
+
+
+def linear_light(codes):
+    """Return linear light from sRGB codes."""
+    return colour.models.eotf_sRGB(codes / 255.0)
+
+
+def oklab(linear):
+    """Return Oklab coordinates by another library."""
+    return colour.XYZ_to_Oklab(colour.RGB_to_XYZ(linear, "sRGB"))
+
+
+@pytest.mark.parametrize("transform", ["srgb", "filmic"])
+def test_what_is_brighter_than_white_loses_its_colour_but_not_its_hue(transform):
+    """A line to white through linear light turns blue by 22 degrees, to violet; clipped channels make it magenta."""
+    rng = np.random.default_rng(11)
+    colors = np.concatenate([np.eye(3), 1.0 - np.eye(3), rng.uniform(0.0, 1.0, (60, 3))])
+    colors /= colors.max(axis=1, keepdims=True)
+    chroma = np.inf
+    for stops in (0.0, 1.0, 2.0, 4.0, 6.0):
+        # without the knee at saturated colours, which is tested above
+        inside = colors if transform == "srgb" else 1.0 - 0.85 * (1.0 - colors)
+        before = oklab(inside)
+        after = oklab(linear_light(view(inside[None].astype(np.float32), stops, transform)[0]))
+        turned = np.hypot(*after[:, 1:].T) * np.abs(np.angle(after[:, 1:] @ [1, 1j] / (before[:, 1:] @ [1, 1j])))
+        # distances in Oklab: a just noticeable difference is 0.02, a code 0.002
+        assert turned.max() < 0.006
+        paler = np.hypot(*after[:, 1:].T)
+        assert (paler < chroma + 3e-3).all()
+        chroma = paler
+    assert view(np.array([[[1e4, 2e4, 1e6]]], np.float32), 0.0, transform).min() >= 254

@@ -1,6 +1,7 @@
 """Predictions of a measured flare: curves and scenes from a ghost model."""
 
 import json
+import pickle
 from functools import cache
 from html import unescape
 
@@ -14,7 +15,9 @@ from flarewright.measure.replay.model_image import light_px, replay_model
 from flarewright.measure.replay.placement import over_clipping
 from flarewright.model.measurement.ghost_model import BezierGhost, GhostModel, Halo, Reference, Star
 from flarewright.model.measurement.replay_camera import ReplayCamera
+from flarewright.model.project.scene import Lamp, SceneCamera
 from flarewright.optics.colour.rgb import luminance_weights
+from flarewright.workflow.measured_camera import model_in_scene
 from flarewright.workflow.measured_flares import Counting, model_flare, model_flares
 
 # light of the captures: 1e5 cd/m2 over 1e-4 sr give 10 lx
@@ -430,3 +433,20 @@ def test_a_model_that_does_not_know_its_light_cannot_stand_in_a_scene(tmp_path, 
     # curves in the model's unit are still possible
     assert run(["predict", str(tmp_path / "camera.json"), "--samples", "5", "--json"]) == 0
     assert "values are in its unit" in capsys.readouterr().err
+
+
+def test_another_process_makes_the_same_flares_again(file):
+    flares = model_flares(str(file), None, 0.02, Counting(around_light=0.1))
+    camera = SceneCamera.model_validate(
+        {"name": "A", "model": str(file), "unit_per_cd_m2": 0.02, "position_m": (0, 0, 0), "aim_m": (0, 10, 0)}
+    )
+    lamp = Lamp.model_validate({"kind": "lamp", "name": "a", "position_m": (4, 10, 0), "intensity_cd": 2e3})
+    in_scene, _ = model_in_scene(camera, lamp, 48)
+    made = []
+    for flare in (flares.sampled, flares.shown, in_scene):
+        again = pickle.loads(pickle.dumps(flare.recipe))(1)
+        assert again.fingerprint == flare.fingerprint
+        assert again.size_px == flare.size_px
+        assert np.array_equal(again.picture(12.0, 40.0), flare.picture(12.0, 40.0))
+        made.append(again.fingerprint)
+    assert len(set(made)) == 3

@@ -12,7 +12,7 @@ from flarewright.cli.app import run
 from flarewright.cli.common import remembered
 from flarewright.model import Camera, Light, Output, Project, Quality
 from flarewright.optics.colour.rgb import luminance_weights
-from flarewright.predict import table
+from flarewright.predict import pictures
 from flarewright.predict.curves import Curves, interpolated_statistics
 from flarewright.predict.flare import Flare, fingerprint_of
 from flarewright.predict.lens_flare import square_flare, statistics_quality
@@ -118,7 +118,7 @@ def test_an_interrupted_prediction_resumes_beside_its_output(tmp_path, capsys, m
     words = "--fstop 16 --quality draft --samples 5 -o"
     arguments = ["predict", singlet_file(tmp_path), *words.split(), str(page)]
     drawn = 0
-    real = table.luminance
+    real = pictures.luminance
 
     def counted(picture, most):
         nonlocal drawn
@@ -127,13 +127,13 @@ def test_an_interrupted_prediction_resumes_beside_its_output(tmp_path, capsys, m
         drawn += 1
         return real(picture)
 
-    monkeypatch.setattr(table, "luminance", lambda picture: counted(picture, 3))
+    monkeypatch.setattr(pictures, "luminance", lambda picture: counted(picture, 3))
     assert run(arguments) == 130
     assert not page.exists()
     assert (tmp_path / "h.partial.npz").is_file()
     assert "the same command resumes" in capsys.readouterr().err
     drawn = 0
-    monkeypatch.setattr(table, "luminance", lambda picture: counted(picture, -1))
+    monkeypatch.setattr(pictures, "luminance", lambda picture: counted(picture, -1))
     assert run([*arguments, "--json"]) == 0
     reported = capsys.readouterr()
     assert "resuming with 3 pictures" in reported.err

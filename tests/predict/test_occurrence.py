@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -74,8 +75,8 @@ def test_turning_the_frame_is_turning_the_light():
 
 
 def test_a_picture_is_drawn_once():
-    drawn = []
-    table = FlareTable(painted(), FRAME, on_draw=lambda: drawn.append(1))
+    drawn, flare = [], painted()
+    table = FlareTable(replace(flare, draw=lambda *at: drawn.append(at) or flare.draw(*at)), FRAME)
     for roll in (0.0, 10.0, 20.0):
         table.at(7.0, roll)
         table.between(7.25, roll)

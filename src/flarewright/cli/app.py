@@ -16,7 +16,7 @@ from .. import __version__
 from ..errors import FlarewrightError
 from ..kernels.jit.warmup_processes import head_start
 from . import dataset, edit, gallery, looks, warm_up
-from .common import end_as_interrupted, end_at_once
+from .common import end_as_interrupted, end_at_once, was_interrupted
 from .design import benchmark as design_benchmark
 from .design import colors as design_colors
 from .design import edit as design_edit
@@ -285,7 +285,7 @@ def _call(words: list[str]) -> int:
         # the interpreter's own word for a call from C that failed without a reason
         if isinstance(error, SystemError) and _memory_is_used_up():
             return _fail(_no_memory(words))
-        if not swallowed:
+        if not swallowed and not was_interrupted():
             raise
         code = 130
     if code == 130:

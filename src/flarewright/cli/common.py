@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from threading import Event, Thread
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FlarewrightError, OutputError, ProjectError
@@ -380,10 +381,24 @@ def ending_signals() -> list[signal.Signals]:
     return [one for one in known if one is not None and signal.getsignal(one) is not signal.SIG_IGN]
 
 
+# signals that asked this process to end
+_received: list[int] = []
+
+
 def end_as_interrupted() -> None:
     """Make a closed terminal and a polite kill end this process as Ctrl-C does: partial work is kept."""
     for one in ending_signals():
-        signal.signal(one, signal.default_int_handler)
+        signal.signal(one, _interrupt)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    _received.append(number)
+    signal.default_int_handler(number, frame)
+
+
+def was_interrupted() -> bool:
+    """Return whether a signal has asked this process to end: a module written in C may report it as an ImportError."""
+    return bool(_received)
 
 
 def end_at_once() -> None:

@@ -37,7 +37,15 @@ class Executor(Protocol):
     """What works off items instead of processes of this machine: `cluster.executor.Cluster`."""
 
     def work_off(
-        self, function: str, context: Any, items: Sequence[Any], *, processes: int, threads: int | None, what: str
+        self,
+        function: str,
+        context: Any,
+        items: Sequence[Any],
+        *,
+        processes: int,
+        threads: int | None,
+        what: str,
+        watch: Callable[[], None] | None,
     ) -> Iterator[Done]:
         """Parameters and errors as of `processes.work_off`."""
         ...
@@ -92,6 +100,7 @@ def work_off(
     threads: int | None = None,
     what: str = "item",
     executor: Executor | None = None,
+    watch: Callable[[], None] | None = None,
 ) -> Iterator[Done]:
     """Call a function for each item, and yield the results as they come.
 
@@ -112,6 +121,8 @@ def work_off(
         What an item is, for messages.
     executor : Executor, optional
         Works off the items instead; None: processes of this machine.
+    watch : callable, optional
+        Called about twice a second while other processes work; an exception of it ends them.
 
     Yields
     ------
@@ -128,7 +139,9 @@ def work_off(
         Any other exception of the function, with its traceback.
     """
     if executor is not None:
-        yield from executor.work_off(function, context, items, processes=processes, threads=threads, what=what)
+        yield from executor.work_off(
+            function, context, items, processes=processes, threads=threads, what=what, watch=watch
+        )
         return
     if processes == 1:
         call = named(function)
@@ -145,7 +158,7 @@ def work_off(
             started.append(process)
             Thread(target=_attend, args=(process, first, todo, lock, answers), daemon=True).start()
         for _ in items:
-            item, answer = next_answer(answers)
+            item, answer = next_answer(answers, watch)
             if answer[0] == "lost":
                 _raise_lost(answer[1], item, what)
             yield Done(item, result_of(item, answer, what))

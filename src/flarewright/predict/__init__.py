@@ -4,6 +4,7 @@
 - `lens_flare`: `lens_flare` and `square_flare` build a `Flare` from a lens
 - `wavelengths`: few wavelengths that give the right luminance
 - `statistics`: `Statistics` of a picture's flare (`measure`)
+- `pictures`: `draw_all` draws pictures that are missing, here or by other processes
 - `table`: `FlareTable` draws each picture of a flare once
 - `curves`: `sample_curves` samples the statistics over the constellation; `check_curves`
 - `contrast`: `contrast` and `washed_share`, the loss of contrast

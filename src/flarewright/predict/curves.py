@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -9,8 +10,9 @@ import numpy as np
 
 from ..typing import Floats, Indices, Progress
 from .flare import Flare, luminance
+from .pictures import Memory, Spread, draw_all, in_colour
 from .statistics import NAMES, Statistics, measure
-from .table import FlareTable, Memory, known_picture
+from .table import FlareTable
 
 # number of initial constellations, and least distance between two, degrees
 FIRST, LEAST_DEG = 13, 0.2
@@ -96,6 +98,7 @@ def sample_curves(
     tolerance: float = 0.03,
     most: int = 64,
     progress: Progress | None = None,
+    spread: Spread | None = None,
 ) -> Curves:
     """Sample the flare at constellations at which interpolation (`interpolated_statistics`) reaches a tolerance.
 
@@ -112,6 +115,8 @@ def sample_curves(
         Largest number of constellations; `worst_step` shows the error if sampling ends there.
     progress : callable, optional
         Called with the finished part and a description.
+    spread : callable, optional
+        Draws several constellations at a time, ahead of their turn; the curves do not depend on it.
 
     Returns
     -------
@@ -125,6 +130,10 @@ def sample_curves(
     end = table.flare.reach_deg if to_deg is None else to_deg
     known: dict[float, Floats] = {}
 
+    def ahead(angles: Sequence[float]) -> None:
+        views = [at for at, _, _ in table.views(roll_deg)]
+        draw_all([table.request(angle, at) for angle in angles for at in views], spread)
+
     def draw(angle: float) -> Floats:
         if angle not in known:
             known[angle] = table.at(angle, roll_deg).values
@@ -133,6 +142,8 @@ def sample_curves(
         return known[angle]
 
     first = [float(angle) for angle in np.linspace(table.flare.least_deg, end, min(FIRST, most))]
+    if spread is not None:
+        ahead(first)
     for angle in first:
         draw(angle)
     # (error found when the interval was created, start, end)
@@ -142,8 +153,11 @@ def sample_curves(
         error, a, b = waiting[0] if waiting else (0.0, 0.0, 0.0)
         if error <= tolerance:
             break
-        before = waiting.pop(0)[0]
         middle = 0.5 * (a + b)
+        if spread is not None and any(table.request(middle, at).missing for at, _, _ in table.views(roll_deg)):
+            # intervals above the tolerance are all halved, in whatever order, unless `most` ends the sampling
+            ahead([0.5 * (low + high) for off, low, high in waiting[: most - len(known)] if off > tolerance])
+        before = waiting.pop(0)[0]
         found = draw(middle)
         peak = np.max(list(known.values()), axis=0)
         line = interpolated_statistics(known[a], known[b], 0.5)
@@ -163,7 +177,12 @@ _FOLLOWED = [NAMES.index(name) for name in ("sum_mm2", "mean", "maximum", "log_a
 
 
 def check_curves(
-    curves: Curves, judge: Flare, count: int, progress: Progress | None = None, memory: Memory | None = None
+    curves: Curves,
+    judge: Flare,
+    count: int,
+    progress: Progress | None = None,
+    memory: Memory | None = None,
+    spread: Spread | None = None,
 ) -> Check:
     """Compare the curves with renders at constellations between the samples.
 
@@ -176,6 +195,8 @@ def check_curves(
     progress : callable, optional
     memory : dict, optional
         Pictures drawn before; new ones are added.
+    spread : callable, optional
+        Draws pictures by other processes.
 
     Returns
     -------
@@ -186,13 +207,10 @@ def check_curves(
     middles = 0.5 * (at[1:] + at[:-1])
     wanted = np.linspace(at[0], at[-1], count + 2)[1:-1]
     chosen = sorted({float(middles[int(np.argmin(np.abs(middles - angle)))]) for angle in wanted})
-    rendered: list[Floats] = []
     known: Memory = {} if memory is None else memory
-    for k, angle in enumerate(chosen):
-        light = luminance(known_picture(judge, known, angle, curves.roll_deg))
-        rendered.append(measure(light, np.ones_like(light), judge.sensor.area).values)
-        if progress is not None:
-            progress((k + 1) / len(chosen), f"check at {angle:.2f} degrees")
+    pictures = draw_all([in_colour(judge, known, angle, curves.roll_deg) for angle in chosen], spread, progress)
+    lights = [luminance(picture) for picture in pictures]
+    rendered = [measure(light, np.ones_like(light), judge.sensor.area).values for light in lights]
     predicted = [curves.at(angle).values for angle in chosen]
     return Check(np.array(chosen), np.array(predicted).reshape(-1, len(NAMES)), np.array(rendered).reshape(-1, 5))
 

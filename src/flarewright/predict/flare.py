@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -92,6 +92,9 @@ class Flare:
         unknown. The clipping of a lens' sensor follows from its ISO (`photometry.exposure_level`).
     remarks : tuple of str
         Remarks for the user.
+    recipe : callable or None
+        Makes the same flare in another process from a number of threads; it can be pickled. None: this flare is drawn
+        here.
     """
 
     name: str
@@ -111,6 +114,7 @@ class Flare:
     left_out: str = "the light's own image is left out"
     over_clipping: float | None = None
     remarks: tuple[str, ...] = ()
+    recipe: Callable[[int | None], Flare] | None = field(default=None, compare=False, repr=False)
 
     def covers(self, constellation_deg: Floats) -> Mask:
         """Return for each constellation whether it can be drawn."""

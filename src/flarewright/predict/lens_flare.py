@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from math import acos, cos, degrees, radians
 
 from ..errors import LensError
@@ -95,7 +96,12 @@ def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
         reach_deg=largest_constellation(light.distance, settled.order.efl),
         fingerprint=fingerprint_of(prepared.model_dump_json()),
         remarks=settled.remarks,
+        recipe=partial(_made_again, project),
     )
+
+
+def _made_again(project: Project, threads: int | None) -> Flare:
+    return lens_flare(project, threads=threads)
 
 
 def largest_constellation(distance: float | None, efl: float) -> float:

@@ -13,8 +13,9 @@ from ..typing import Floats, Pixels, Progress
 from .contrast import contrast
 from .curves import Check, Curves, bins_of, check_curves, sample_curves
 from .flare import Flare, Frame
+from .pictures import Memory, Spread, draw_all, in_colour
 from .statistics import NAMES
-from .table import FlareTable, Memory, known_picture
+from .table import FlareTable
 
 # number of pictures in the report
 SHOWN = 8
@@ -128,7 +129,11 @@ class Occurrence:
 
 
 def predict_occurrence(
-    flares: Flares, wanted: Wanted, reported: Callable[[str], Progress], memory: Memory | None = None
+    flares: Flares,
+    wanted: Wanted,
+    reported: Callable[[str], Progress],
+    memory: Memory | None = None,
+    spread: Spread | None = None,
 ) -> Occurrence:
     """Sample, check and draw the flare of a camera over the constellation.
 
@@ -140,6 +145,8 @@ def predict_occurrence(
         Called with the name of a part of the work; returns the progress callback of that part.
     memory : dict, optional
         Pictures drawn before; new ones are added.
+    spread : callable, optional
+        Draws pictures by other processes; the prediction does not depend on it.
 
     Returns
     -------
@@ -150,17 +157,16 @@ def predict_occurrence(
     table = FlareTable(flares.sampled, flares.frame, drawn=known.setdefault(flares.sampled.fingerprint, {}))
     curves = sample_curves(
         table, to_deg=wanted.to_deg, roll_deg=wanted.roll_deg, tolerance=wanted.tolerance, most=wanted.samples,
-        progress=reported("curves"),
+        progress=reported("curves"), spread=spread,
     )  # fmt: skip
     check = None
     if flares.judge is not None and wanted.checks > 0:
-        check = check_curves(curves, flares.judge, wanted.checks, reported("checks"), known)
-    pictures = []
+        check = check_curves(curves, flares.judge, wanted.checks, reported("checks"), known, spread)
+    pictures: list[tuple[float, Pixels]] = []
     if wanted.pictures:
-        progress = reported("pictures")
-        for k, angle in enumerate(angles := _worth_a_look(curves)):
-            pictures.append((angle, known_picture(flares.shown, known, angle, wanted.roll_deg)))
-            progress((k + 1) / len(angles), f"{angle:.1f} degrees")
+        angles = _worth_a_look(curves)
+        requests = [in_colour(flares.shown, known, angle, wanted.roll_deg) for angle in angles]
+        pictures = list(zip(angles, draw_all(requests, spread, reported("pictures")), strict=True))
     return Occurrence(
         flares.sampled, flares.frame, flares.quality, curves, wanted.bins, check, None, wanted.setting, tuple(pictures)
     )

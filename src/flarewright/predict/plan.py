@@ -14,8 +14,9 @@ from ..typing import Floats, Mask, Progress
 from .contrast import WASHED, contrast
 from .flare import Flare, Frame
 from .photometry import exposure_level
+from .pictures import Memory, PictureRequest, Spread, draw_all
 from .statistics import NAMES
-from .table import FlareTable, Memory
+from .table import FlareTable
 from .tracks import CameraSighting, CameraTrack, camera_track, moments, sightings
 
 FlareMaker = Callable[[SceneCamera, SceneLight, float, float | None], tuple[Flare, Frame]]
@@ -201,7 +202,11 @@ def rounded_diameter(sighting: CameraSighting) -> float:
 
 
 def plan_scene(
-    scene: Scene, maker: FlareMaker, reported: Callable[[str], Progress], memory: Memory | None = None
+    scene: Scene,
+    maker: FlareMaker,
+    reported: Callable[[str], Progress],
+    memory: Memory | None = None,
+    spread: Spread | None = None,
 ) -> Plan:
     """Compute the positions of cameras and lights over time, and the flare of all pairs.
 
@@ -215,6 +220,8 @@ def plan_scene(
         Called with the name of a part of the work; returns the progress callback of that part.
     memory : dict, optional
         Pictures drawn before, by the flares' fingerprints; new ones are added.
+    spread : callable, optional
+        Draws pictures by other processes; the plan does not depend on it.
 
     Returns
     -------
@@ -229,7 +236,15 @@ def plan_scene(
     tracks = tuple(camera_track(one, times, f"cameras[{c}] ({one.name})") for c, one in enumerate(scene.cameras))
     seen = sightings(scene, tracks, times, dates)
     tables = _tables_of(scene, seen, maker, memory)
-    draw_ahead(tables, seen, reported("flares"))
+    # all pictures that the sightings need, so that the progress is known
+    pairs_of = (
+        (table, sighting) for row in zip(tables, seen, strict=True) for table, sighting in zip(*row, strict=True)
+    )
+    draw_all(
+        [request for table, sighting in pairs_of for request in requests_of(table, sighting)],
+        spread,
+        reported("flares"),
+    )
     pairs, remarks = [], []
     for c, (camera, row) in enumerate(zip(scene.cameras, seen, strict=True)):
         remarks += [f"{camera.name}: {remark}" for table in tables[c] for remark in table.flare.remarks]
@@ -242,22 +257,29 @@ def plan_scene(
     return Plan(scene, times, dates, tracks, tables, tuple(pairs), tuple(dict.fromkeys(remarks)))
 
 
-def draw_ahead(
-    tables: Sequence[Sequence[FlareTable]], seen: Sequence[Sequence[CameraSighting]], progress: Progress
-) -> None:
-    """Draw every picture that the sightings need, so that the progress is known."""
-    wanted: dict[tuple[str, float, float], FlareTable] = {}
-    for row, line in zip(tables, seen, strict=True):
-        for table, sighting in zip(row, line, strict=True):
-            for c, roll, lux in zip(
-                sighting.constellation_deg, sighting.roll_deg, sighting.illuminance_lx, strict=True
-            ):
-                if lux > 0.0 and table.flare.least_deg <= c <= table.flare.reach_deg:
-                    for node, at_roll, _, _ in table.nodes(float(c), float(roll)):
-                        wanted[table.flare.fingerprint, node, at_roll] = table
-    for k, ((_, node, roll), table) in enumerate(wanted.items()):
-        table.light(node, roll)
-        progress((k + 1) / len(wanted), f"{table.flare.name}, {node:.4g} degrees")
+def requests_of(table: FlareTable, sighting: CameraSighting, times: Mask | None = None) -> list[PictureRequest]:
+    """Return the pictures that the flare of a light needs.
+
+    Parameters
+    ----------
+    table : FlareTable
+    sighting : CameraSighting
+    times : ndarray of bool, shape (T,), optional
+        Times that count (default: all).
+
+    Returns
+    -------
+    list of PictureRequest
+        Each once.
+    """
+    angles = sighting.constellation_deg
+    lit = table.flare.covers(angles) & (sighting.illuminance_lx > 0.0)
+    needed: dict[tuple[float, float], PictureRequest] = {}
+    for t in np.flatnonzero(lit if times is None else lit & times):
+        for node, roll, _, _ in table.nodes(float(angles[t]), float(sighting.roll_deg[t])):
+            request = table.request(node, roll)
+            needed[request.at] = request
+    return list(needed.values())
 
 
 def _measured(table: FlareTable, sighting: CameraSighting) -> Pair:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, nan
 
@@ -9,8 +10,9 @@ import numpy as np
 
 from ..errors import ProjectError
 from ..typing import Floats, Progress
-from .plan import Plan
-from .tracks import camera_track, moved_by, sightings
+from .pictures import Spread, draw_all
+from .plan import Plan, requests_of
+from .tracks import CameraSighting, camera_track, moved_by, sightings
 
 # least reduction of the veil for a position to count as better
 WORTH = 0.02
@@ -57,7 +59,12 @@ class BestPosition:
 
 
 def best_position(
-    plan: Plan, camera: int, radius_m: float, height_m: float = 0.0, progress: Progress | None = None
+    plan: Plan,
+    camera: int,
+    radius_m: float,
+    height_m: float = 0.0,
+    progress: Progress | None = None,
+    spread: Spread | None = None,
 ) -> BestPosition:
     """Search less flare within a disc, or a flat cylinder, around a camera's position.
 
@@ -70,6 +77,8 @@ def best_position(
     height_m : float
         Largest change of height.
     progress : callable, optional
+    spread : callable, optional
+        Draws the pictures of several positions by other processes; the result does not depend on it.
 
     Returns
     -------
@@ -90,20 +99,26 @@ def best_position(
     # compare positions only at times at which the current flare is known
     known = np.all([pair.known[chosen] for pair in plan.pairs[camera]], axis=0)
 
-    def veil(offset: Floats) -> float:
+    tables = plan.tables[camera]
+
+    def seen_from(offset: Floats) -> tuple[float, Sequence[CameraSighting]]:
+        """Return the veil without the lights, and those to add to it."""
         try:
             moved = moved_by(track, offset, one, times, one.name)
             seen = sightings(scene, [moved], times, dates)[0]
         except ProjectError:
             # the position is on a lamp or on the aim point
-            return inf
-        total = 0.0
-        for table, sighting in zip(plan.tables[camera], seen, strict=True):
+            return inf, ()
+        for table, sighting in zip(tables, seen, strict=True):
             lit = known & (sighting.illuminance_lx > 0.0)
-            inside = table.flare.covers(sighting.constellation_deg)
-            if not table.flare.dark_beyond and (lit & ~inside).any():
-                return nan
-            for t in np.flatnonzero(lit & inside):
+            if not table.flare.dark_beyond and (lit & ~table.flare.covers(sighting.constellation_deg)).any():
+                return nan, ()
+        return 0.0, seen
+
+    def veil(total: float, seen: Sequence[CameraSighting]) -> float:
+        for table, sighting in zip(tables, seen, strict=False):
+            lit = known & (sighting.illuminance_lx > 0.0)
+            for t in np.flatnonzero(lit & table.flare.covers(sighting.constellation_deg)):
                 mean = table.mean_between(float(sighting.constellation_deg[t]), float(sighting.roll_deg[t]))
                 total += mean * float(sighting.illuminance_lx[t])
         return total / plan.scene_scale(camera) / int(known.sum())
@@ -111,17 +126,23 @@ def best_position(
     offsets = [np.zeros(3)]
     if not known.any():
         return BestPosition(camera, radius_m, height_m, np.array(offsets), np.array([nan]), 0, 0, len(times))
-    veils = [veil(offsets[0])]
+    veils = [veil(*seen_from(offsets[0]))]
     count = FIRST + ROUNDS * LATER
     centre, reach, high = np.zeros(3), radius_m, height_m
     for turn in range(ROUNDS + 1):
-        for offset in _sunflower(FIRST if turn == 0 else LATER, reach, high) + centre:
+        near = list(_sunflower(FIRST if turn == 0 else LATER, reach, high) + centre)
+        for offset in near:
             flat = float(np.hypot(offset[0], offset[1]))
             if flat > radius_m:
                 offset[:2] *= radius_m / flat
             offset[2] = np.clip(offset[2], -height_m, height_m)
+        looks = [seen_from(offset) for offset in near]
+        if spread is not None:
+            pairs = [pair for _, seen in looks for pair in zip(tables, seen, strict=False)]
+            draw_all([request for table, sighting in pairs for request in requests_of(table, sighting, known)], spread)
+        for offset, look in zip(near, looks, strict=True):
             offsets.append(offset)
-            veils.append(veil(offset))
+            veils.append(veil(*look))
             if progress is not None:
                 progress((len(veils) - 1) / count, f"position {len(veils) - 1} of {count}")
         best = _least(veils)

@@ -2,51 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import floor, inf
 
 import numpy as np
 
 from ..errors import FlarewrightError
-from ..typing import Floats, Pixels
-from .flare import Flare, Frame, luminance
+from ..typing import Floats
+from .flare import Flare, Frame
+from .pictures import Drawn, PictureRequest, draw_all
 from .statistics import NAMES, Statistics, covered_area, measure
 
 # drawn rolls per blade of an iris, and step of drawn rolls for a flare that cannot be rotated, degrees
 PHASES, ROLL_STEP_DEG = 4, 15.0
 # decimals of a degree to which angles are rounded
 DECIMALS = 4
-
-Drawn = dict[tuple[float, float], Pixels]
-Memory = dict[str, Drawn]
-"""Drawn pictures, by the flare's fingerprint, then by (constellation, roll) in degrees.
-
-Luminance; in colour for a fingerprint with `IN_COLOUR`.
-"""
-IN_COLOUR = "-rgb"
-
-
-def known_picture(flare: Flare, memory: Memory, constellation_deg: float, roll_deg: float) -> Pixels:
-    """Return `Flare.picture`, drawn once.
-
-    Parameters
-    ----------
-    flare : Flare
-    memory : dict
-        Pictures drawn before; a new one is added, unless the flare has no fingerprint.
-    constellation_deg, roll_deg : float
-
-    Returns
-    -------
-    ndarray, shape (H, W, 3)
-    """
-    if not flare.fingerprint:
-        return flare.picture(constellation_deg, roll_deg)
-    drawn, key = memory.setdefault(flare.fingerprint + IN_COLOUR, {}), (constellation_deg, roll_deg)
-    if key not in drawn:
-        drawn[key] = flare.picture(*key)
-    return drawn[key]
 
 
 @dataclass(frozen=True)
@@ -62,15 +32,12 @@ class FlareTable:
         Distance of drawn constellations in `between`.
     drawn : dict
         Luminance of drawn pictures by (constellation, roll); a cache, ignored in comparisons.
-    on_draw : callable or None
-        Called after each new picture.
     """
 
     flare: Flare
     frame: Frame
     step_deg: float = 1.0
     drawn: Drawn = field(default_factory=dict, compare=False, repr=False)
-    on_draw: Callable[[], None] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         needed = 0.0 if self.flare.turns_by_deg is None else self.frame.diagonal
@@ -81,14 +48,15 @@ class FlareTable:
                 f"{self.frame.width:g}x{self.frame.height:g} mm that turns needs {needed:.4g} mm both ways"
             )
 
+    def request(self, constellation_deg: float, roll_deg: float) -> PictureRequest:
+        """Return the request for the picture at a constellation and a drawn roll."""
+        return PictureRequest(
+            self.flare, round(constellation_deg, DECIMALS), round(roll_deg, DECIMALS), drawn=self.drawn
+        )
+
     def light(self, constellation_deg: float, roll_deg: float) -> Floats:
         """Return the luminance of the picture at a constellation and roll, shape (H, W); drawn once."""
-        key = (round(constellation_deg, DECIMALS), round(roll_deg, DECIMALS))
-        if key not in self.drawn:
-            self.drawn[key] = luminance(self.flare.picture(*key)).astype(np.float32)
-            if self.on_draw is not None:
-                self.on_draw()
-        return self.drawn[key].astype(np.float64)
+        return draw_all([self.request(constellation_deg, roll_deg)])[0].astype(np.float64)
 
     def _share(self, turn_deg: float) -> Floats:
         return covered_area(self.flare.size_px, self.flare.sensor, self.frame, round(turn_deg, 1))

@@ -10,8 +10,8 @@ import numpy as np
 from ..typing import Pixels, Progress
 from .contrast import washed_share
 from .flare import luminance
+from .pictures import Memory, Spread, draw_all, in_colour
 from .plan import FlareMaker, Plan, Ranked, near_or_far
-from .table import Memory, known_picture
 
 # largest number of pairs of camera and light
 PICTURES = 6
@@ -39,7 +39,12 @@ class Worst:
 
 
 def render_worst(
-    plan: Plan, ranked: Sequence[Ranked], maker: FlareMaker, progress: Progress, memory: Memory | None = None
+    plan: Plan,
+    ranked: Sequence[Ranked],
+    maker: FlareMaker,
+    progress: Progress,
+    memory: Memory | None = None,
+    spread: Spread | None = None,
 ) -> list[Worst]:
     """Render the worst times of the first pairs of a ranking.
 
@@ -52,6 +57,8 @@ def render_worst(
     progress : callable
     memory : dict, optional
         Pictures drawn before; new ones are added.
+    spread : callable, optional
+        Draws pictures by other processes.
 
     Returns
     -------
@@ -60,14 +67,15 @@ def render_worst(
     scene = plan.scene
     known: Memory = {} if memory is None else memory
     chosen = [(one, one.worst) for one in ranked if one.worst is not None and one.worst_veil_cd_m2][:PICTURES]
-    out = []
-    for k, (one, worst) in enumerate(chosen):
+    requests, factors = [], []
+    for one, worst in chosen:
         seen = plan.pairs[one.camera][one.light].sighting
-        camera, light = scene.cameras[one.camera], scene.lights[one.light]
-        flare, _ = near_or_far(maker, camera, light, seen)
-        factor = float(seen.illuminance_lx[worst]) / flare.scene_scale
+        flare, _ = near_or_far(maker, scene.cameras[one.camera], scene.lights[one.light], seen)
+        factors.append(float(seen.illuminance_lx[worst]) / flare.scene_scale)
         at = float(seen.constellation_deg[worst]), float(seen.roll_deg[worst])
-        drawn = known_picture(flare, known, *at)
+        requests.append(in_colour(flare, known, *at))
+    out = []
+    for (one, _), drawn, factor in zip(chosen, draw_all(requests, spread, progress), factors, strict=True):
         picture = (drawn * factor).astype(np.float32)
         bright = luminance(picture)
         washed = None
@@ -75,5 +83,4 @@ def render_worst(
             low, high = scene.luminance_cd_m2
             washed = washed_share(bright, np.ones_like(bright), high, low)
         out.append(Worst(one, picture, float(bright.mean()), washed))
-        progress((k + 1) / len(chosen), f"{light.name} in {camera.name}")
     return out

@@ -6,8 +6,10 @@ The command line and other front ends call these functions; nothing here prints.
 - `measure_merge`: `merge_on` merges photographs, on this machine or on a cluster
 - `measure_provenance`: `STAGES`; records from which model the file of a later stage was made
 - `lens_search`: `search_lenses` searches lenses for a project's targets and returns a `LensSearch`
+- `search_restarts`: `search_restarts` searches several times independently, by processes or on a cluster
 - `flare_curves`: `flare_curves` predicts a lens' flare over the constellation
 - `lens_flares`: `lens_flares`, `scene_flare` and `camera_project` build the flares that a prediction needs
+- `flare_pictures`: `pictures_elsewhere`, processes or a cluster that draw the pictures of predictions
 - `ghost_sweep`: `sweep_ghosts` analyses ghosts over fields, wavelengths and f-numbers, `surface_gains` ranks surfaces
 - `lens_export`: `export_lens` writes a lens in the formats of other programs
 - `own_library`: the user's library of lenses: `add_lenses`, `own_library`, `remove_lens`, `make_thumbnails`

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -18,6 +19,9 @@ def flare_curves(
     quality: str = "final",
     threads: int | None = None,
     progress: Callable[[str], Progress] = lambda _: lambda _part, _words: None,
+    processes: int | None = None,
+    cluster: str | None = None,
+    announce: Callable[[str], None] | None = None,
 ) -> Occurrence:
     """Predict sum, mean, maximum and log-average of a lens' flare over the constellation.
 
@@ -33,6 +37,8 @@ def flare_curves(
         Default: all cores; the curves do not depend on it.
     progress : callable
         Called with the name of a part of the work; returns the progress callback of that part.
+    processes, cluster, announce
+        As of `flare_pictures.pictures_elsewhere`; the curves do not depend on them.
 
     Returns
     -------
@@ -41,7 +47,7 @@ def flare_curves(
     Raises
     ------
     FlarewrightError
-        When the lens cannot be rendered.
+        When the lens cannot be rendered, or there is no such cluster.
 
     Examples
     --------
@@ -52,6 +58,9 @@ def flare_curves(
     >>> found.curves.angles_deg  # doctest: +SKIP
     """
     from ..predict.occurrence import Wanted, predict_occurrence
+    from .flare_pictures import pictures_elsewhere
     from .lens_flares import lens_flares
 
-    return predict_occurrence(lens_flares(project, quality, threads), Wanted() if wanted is None else wanted, progress)
+    with pictures_elsewhere(cluster, processes, threads, Path(), announce) as spread:
+        flares = lens_flares(project, quality, threads)
+        return predict_occurrence(flares, Wanted() if wanted is None else wanted, progress, spread=spread)

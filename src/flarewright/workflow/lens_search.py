@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ..design.solvers.solvers import Choice
     from ..model import Iris, Project
     from ..render.scene.resolve import ResolvedProject
+    from .search_restarts import Sharing
 
 FINISHING = 0.15
 """Part of the time for finishing lenses with traced rays or glasses."""
@@ -67,6 +68,7 @@ def search_lenses(
     report: Report = lambda _: None,
     progress: Callable[[str], Observer | None] = lambda _unit: None,
     cancelled: Callable[[], bool] = lambda: False,
+    sharing: Sharing | None = None,
 ) -> LensSearch:
     """Search lenses whose ghosts meet a project's targets.
 
@@ -75,15 +77,15 @@ def search_lenses(
     project : Project
         Its `design` has the targets; without a design, other lenses with the same ghosts are searched.
     time_s : float
-        Time for the search and for finishing its lenses.
+        Time for the search, or for each of its restarts, and for finishing the lenses.
     seed : int
         Seed of the random numbers.
     state : PoolState, optional
-        State of an earlier search to resume.
+        State of an earlier search to resume, or with a number of `restarts`, which need `sharing`.
     lenses : int
         Largest number of distinct lenses to return.
     searches : int, optional
-        Number of local searches after which the search ends.
+        Number of local searches after which the search ends, or each of its restarts.
     threads : int, optional
         Default: all cores; the lenses do not depend on it.
     choice : Choice, optional
@@ -98,6 +100,8 @@ def search_lenses(
         Called with the unit that the solver counts; returns the callback that gets the state during the search.
     cancelled : callable
         Returns True to end the search early.
+    sharing : Sharing, optional
+        Who works off the restarts, and where they keep their states.
 
     Returns
     -------
@@ -106,7 +110,7 @@ def search_lenses(
     Raises
     ------
     ProjectError
-        When the targets cannot be read, or the state belongs to another project.
+        When the targets cannot be read, the state belongs to another project, or there is no such cluster.
 
     Examples
     --------
@@ -123,10 +127,14 @@ def search_lenses(
     from ..design.solvers.evolution_log import until
     from ..design.solvers.pool_search import PoolState
     from ..design.solvers.solvers import Limits, chosen, make_ready, solve_with
+    from .search_restarts import search_restarts
 
     problem, settled = problem_of(project)
     state = PoolState(seed) if state is None else state
-    _check_same_problem(state, problem)
+    if not state.fits(problem):
+        raise ProjectError("the search was started for a lens with another number of rows; restart it")
+    if state.restarts > 1 and sharing is None:
+        raise ProjectError(f"the search has {state.restarts} restarts, which need a folder; give sharing")
     proven = obstacles(problem, project)
     for one in proven:
         report(f"impossible: {one.reason}")
@@ -134,10 +142,17 @@ def search_lenses(
     make_ready(solver, problem, measure)
     # reserve part of the time for finishing with rays and glasses
     rest, started = FINISHING * time_s if problem.traced or problem.glasses is not None else 0.0, time.perf_counter()
-    state = solve_with(
-        solver, problem, limits=Limits(time_s - rest, searches, progress(solver.unit), cancelled), seed=state.seed,
-        measure=measure, threads=threads, state=state,
-    ).state  # fmt: skip
+    limits = Limits(time_s - rest, searches, progress(solver.unit), cancelled)
+    if sharing is not None:
+        ended = search_restarts(
+            solver, problem, state, sharing, limits=limits, measure=measure, threads=threads, report=report
+        )
+        # the time that remains must not depend on how many restarts ran at a time
+        state, started = ended.state, time.perf_counter() - ended.longest_s
+    else:
+        state = solve_with(
+            solver, problem, limits=limits, seed=state.seed, measure=measure, threads=threads, state=state
+        ).state
     over = until(time_s - (time.perf_counter() - started), cancelled)
     found, conflict = _best(state, problem, lenses, name or f"After {settled.lens.name}", settled.iris, over)
     return LensSearch(problem, settled, state, found, tuple(proven), conflict)
@@ -155,11 +170,3 @@ def _best(
         return found, ()
     nearest = nearest_outcomes(state, problem, count=count, name=name, iris=iris, over=over)
     return nearest, without_ghosts(problem, seed=state.seed)
-
-
-def _check_same_problem(state: PoolState, problem: Problem) -> None:
-    """Raise when a search state belongs to another project."""
-    rows = problem.structures[0].rows
-    members = [one for run in state.runs for one in run.members] + list(state.ended)
-    if any(one.structure.rows != rows for one in members):
-        raise ProjectError("the search was started for a lens with another number of rows; restart it")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -78,7 +78,13 @@ def model_in_scene(camera: SceneCamera, light: SceneLight, width_px: int) -> tup
     if light.spectrum != type(light).model_fields["spectrum"].default:
         reported.append(f"measured in its captures' light: the spectrum of {light.name} makes no difference")
     signal, doubt = _over_clipping(model, camera)
-    return replace(flare, over_clipping=signal, remarks=(*flare.remarks, *reported, *doubt)), flare.sensor
+    remarks = (*flare.remarks, *reported, *doubt)
+    recipe = partial(_made_again, camera, light, width_px)
+    return replace(flare, over_clipping=signal, remarks=remarks, recipe=recipe), flare.sensor
+
+
+def _made_again(camera: SceneCamera, light: SceneLight, width_px: int, _threads: int | None) -> Flare:
+    return model_in_scene(camera, light, width_px)[0]
 
 
 def _counting(camera: SceneCamera) -> Counting:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -89,9 +89,25 @@ def model_flares(
     model = read_ghost_model(path)
     width = sensor_width(model, sensor_mm, lambda width, height: f"--sensor {width:g}x{height:g}")
     sampled, shown = (
-        model_flare(model, Path(path).name, width, unit_per_cd_m2, side, counting) for side in (SIDE_PX, SHOWN_PX)
+        replace(
+            model_flare(model, Path(path).name, width, unit_per_cd_m2, side, counting),
+            recipe=partial(_made_again, path, sensor_mm, unit_per_cd_m2, counting, side),
+        )
+        for side in (SIDE_PX, SHOWN_PX)
     )
     return Flares(sampled, sampled.sensor, "measured", None, shown)
+
+
+def _made_again(
+    path: str,
+    sensor_mm: tuple[float, float] | None,
+    unit_per_cd_m2: float | None,
+    counting: Counting,
+    width_px: int,
+    _threads: int | None,
+) -> Flare:
+    flares = model_flares(path, sensor_mm, unit_per_cd_m2, counting)
+    return flares.sampled if width_px == SIDE_PX else flares.shown
 
 
 def sensor_width(

@@ -72,18 +72,6 @@ def test_the_srgb_view_leaves_what_a_screen_can_show():
     assert np.abs(view(colours, 0.0, "srgb") - exact).max() < 0.5 + 2e-4
 
 
-def test_what_is_brighter_than_white_becomes_white_and_no_other_colour():
-    """Clipping each channel would show both as magenta, (255, 188, 255) and (255, 0, 255)."""
-    bright = np.array([[2.0, 0.5, 7.0], [1.2, 0.0, 4.0], [1e4, 2e4, 1e6]])
-    part = 1.0 / bright.max(axis=1, keepdims=True)
-    wanted = 1.0 - part + bright * part * part
-    codes = view(bright[None].astype(np.float32), 0.0, "srgb")[0]
-    assert np.abs(codes - 255.0 * srgb_oetf(wanted)).max() < 0.5 + 2e-3
-    # the order of the channels stays, and the largest is white
-    assert (np.argsort(codes[:2], axis=1) == np.argsort(bright[:2], axis=1)).all()
-    assert (codes[:, 2] == 255).all()
-
-
 def test_filmic_keeps_darks_rolls_off_and_reaches_white():
     light = np.geomspace(1e-4, 1e7, 200)
     codes = view(np.repeat(light[:, None, None], 3, axis=2).astype(np.float32), 0.0)[:, 0]
@@ -103,7 +91,7 @@ def test_filmic_keeps_darks_rolls_off_and_reaches_white():
 def test_colours_lose_their_saturation_slowly():
     """Half of it at eight times white."""
     blue = decoded(view(np.array([[[0.1, 0.1, 9.0]]], np.float32), 0.0)[0, 0])
-    assert blue[0] / blue[2] == pytest.approx(0.5, abs=0.06)
+    assert blue[:2].mean() / blue[2] == pytest.approx(0.5, abs=0.06)
 
 
 @pytest.mark.parametrize("transform", ["srgb", "filmic"])

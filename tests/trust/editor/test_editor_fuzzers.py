@@ -5,9 +5,17 @@ import pytest
 pytest.importorskip("starlette", reason="the extra ui is not installed")
 pytest.importorskip("websockets", reason="the extra ui is not installed")
 
+from flarewright.editor.preview import render_picture
 from flarewright.editor.server.access import Guard
 
 from . import foreign_account, hostile_page, posts, sockets
+
+
+@pytest.fixture(autouse=True)
+def _small_pictures(monkeypatch):
+    """Draw as small as the editor that is tried sets for good; other tests have their size back."""
+    monkeypatch.setattr(render_picture, "WIDEST", 96)
+    monkeypatch.setattr(render_picture, "HIGHEST", 54)
 
 
 @pytest.mark.slow

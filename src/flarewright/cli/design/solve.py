@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...errors import OutputError
+from ...errors import OutputError, ProjectError
 from ..common import checkpoints, print_json, print_remarks, stop_on_interrupt
 from .checks import check_fitness, check_time
 
@@ -22,10 +22,13 @@ if TYPE_CHECKING:
     from ...design.solvers.pool_search import PoolState
     from ...design.solvers.solvers import Choice
     from ...model import Project
+    from ...workflow.search_restarts import Sharing
 
 EPILOG = (
     "Examples:\n\nflarewright design solve shot.toml -o found --time 60\n\n"
-    "flarewright design resume found --time 600\n\nflarewright render found/lens-1.toml --light 10,5 -o flare.exr"
+    "flarewright design resume found --time 600\n\n"
+    "flarewright design solve shot.toml -o many --restarts 8 --cluster local:4\n\n"
+    "flarewright render found/lens-1.toml --light 10,5 -o flare.exr"
 )
 
 Output = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for lenses and report.")]
@@ -39,6 +42,22 @@ Threads = Annotated[
 ]
 Searches = Annotated[
     int | None, typer.Option(min=1, help="Approximate number of local searches (evaluations) after which to end.")
+]
+Restarts = Annotated[
+    int,
+    typer.Option(
+        "--restarts", min=1, max=1000,
+        help="Number of independent searches, each of --time and --searches, whose best lenses are merged.",
+    ),
+]  # fmt: skip
+Processes = Annotated[
+    int | None, typer.Option(min=1, help="Number of processes that search, for --restarts (default: one per core).")
+]
+Cluster = Annotated[
+    str | None,
+    typer.Option(
+        metavar="WHERE", help="Search on a Dask cluster, for --restarts: local:N, tcp://HOST:PORT or slurm:FILE."
+    ),
 ]
 Solver = Annotated[
     str,
@@ -60,6 +79,9 @@ def solve(
     threads: Threads = None,
     solver: Solver = "pools",
     fitness: Fitness = "ours",
+    restarts: Restarts = 1,
+    processes: Processes = None,
+    cluster: Cluster = None,
     as_json: Json = False,
 ) -> None:
     r"""Search lenses whose ghosts meet the targets of a project.
@@ -69,8 +91,10 @@ def solve(
     """
     check_time(time_s)
     measure = check_fitness(fitness)
+    sharing = _sharing(output, restarts, processes, cluster, threads)
     from ...design.solvers.solvers import chosen
     from ...io.project.project_file import read_project
+    from ...workflow.search_restarts import FOLDER
 
     choice = chosen(solver)
     given = read_project(project)
@@ -79,9 +103,14 @@ def solve(
     if (output / "search.json").exists():
         raise OutputError(f"{output} holds a search already; resume it with flarewright design resume {output}, or "
                           "choose another folder")  # fmt: skip
+    if sharing is not None and any((output / FOLDER).glob("*.json")):
+        raise OutputError(f"{output / FOLDER} holds searches of an earlier command; choose another folder")
     from ...design.solvers.pool_search import PoolState
 
-    search(given, output, time_s, PoolState(seed), lenses, searches, threads, as_json, choice=choice, measure=measure)
+    search(
+        given, output, time_s, PoolState(seed, restarts=restarts), lenses, searches, threads, as_json, choice=choice,
+        measure=measure, sharing=sharing,
+    )  # fmt: skip
 
 
 def resume(
@@ -90,6 +119,8 @@ def resume(
     lenses: Lenses = 5,
     searches: Searches = None,
     threads: Threads = None,
+    processes: Processes = None,
+    cluster: Cluster = None,
     as_json: Json = False,
 ) -> None:
     """Resume an interrupted search; the result equals that of an uninterrupted one."""
@@ -98,14 +129,37 @@ def resume(
     from ...io.project.project_file import read_project
 
     state, name = read_search(folder / "search.json")
-    search(read_project(folder / "project.toml"), folder, time_s, state, lenses, searches, threads, as_json, name=name)
+    sharing = _sharing(folder, state.restarts, processes, cluster, threads)
+    search(
+        read_project(folder / "project.toml"), folder, time_s, state, lenses, searches, threads, as_json, name=name,
+        sharing=sharing,
+    )  # fmt: skip
+
+
+def _sharing(
+    folder: Path, restarts: int, processes: int | None, cluster: str | None, threads: int | None
+) -> Sharing | None:
+    """Return who works off the restarts; None: there is one search."""
+    from ...jobs.cluster.executor import workers_of
+    from ...workflow.search_restarts import Sharing
+
+    workers_of(cluster, processes, threads)
+    if restarts > 1:
+        return Sharing(folder, processes, cluster, lambda line: print_remarks([line]))
+    for flag, value in (("processes", processes), ("cluster", cluster)):
+        if value is not None:
+            raise ProjectError(
+                f"--{flag} {value} shares out independent searches, and there is one: start with --restarts 8, "
+                f"or omit --{flag}"
+            )
+    return None
 
 
 def search(
     project: Project, folder: Path, time_s: float, state: PoolState, lenses: int, searches: int | None,
     threads: int | None, as_json: bool, name: str | None = None,
     choice: Choice | None = None, measure: Measure = "ours", talk: bool = True,
-    resume_by: str | None = None,
+    resume_by: str | None = None, sharing: Sharing | None = None,
 ) -> tuple[Problem, tuple[Outcome, ...], dict[str, Any]]:  # fmt: skip
     """Search, write the folder and print the result.
 
@@ -130,6 +184,8 @@ def search(
         False: the caller prints the result.
     resume_by : str, optional
         What the user runs to resume; None: `design resume`.
+    sharing : Sharing, optional
+        Who works off the restarts of `state`.
 
     Returns
     -------
@@ -159,6 +215,9 @@ def search(
         def note(now: PoolState) -> None:
             nonlocal latest
             latest = now
+            if sharing is not None and stored is state:
+                # restarts keep their own states from now on; this names their number
+                store()
             if show is not None:
                 show(now)
 
@@ -168,6 +227,7 @@ def search(
         done = search_lenses(
             project, time_s=time_s, state=state, lenses=lenses, searches=searches, threads=threads, choice=choice,
             measure=measure, name=name, report=lambda line: print_remarks([line]), progress=observer, cancelled=asked,
+            sharing=sharing,
         )  # fmt: skip
     problem, found, proven, conflict = done.problem, done.outcomes, done.obstacles, done.conflict
     remarks = write_folder(folder, project, problem, done.state, found, proven, conflict, name)

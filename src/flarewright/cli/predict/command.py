@@ -18,6 +18,7 @@ from .scene import SceneRequest, is_scene, predict_scene
 if TYPE_CHECKING:
     from ...model import Project
     from ...predict.occurrence import Flares, Occurrence, Setting, Wanted
+    from ...predict.pictures import Spread
     from ...render.scattering.veiling_glare import VeilingGlare
 
 EPILOG = (
@@ -49,12 +50,17 @@ def predict(options: PredictOptions) -> None:
         check_place(options.cache, ".npz")
     if options.quality not in (None, "draft", "final"):
         raise ProjectError(f"--quality {options.quality!r} is unknown here; choose draft or final")
+    from ...jobs.cluster.executor import workers_of
+
+    workers_of(options.cluster, options.processes, options.threads)
+    # any number of processes draws the same pictures
+    unnamed = repr(replace(options, threads=None, processes=None, cluster=None))
     if is_scene(options.subject):
         _refuse(_given(options, _OF_LENS + _OF_MODEL + _OF_CURVES), "a scene", "the scene file sets it")
         request = SceneRequest(
             options.output, options.quality or "final", options.near,
             5.0 if options.radius is None else options.radius, options.height or 0.0, options.shortest_shot or 0.0,
-            options.glare, options.threads, options.as_json, options.cache, repr(options),
+            options.glare, options.threads, options.as_json, options.cache, unnamed, options.processes, options.cluster,
         )  # fmt: skip
         predict_scene(Path(options.subject), _checked(request, options.radius or options.height))
         return
@@ -65,12 +71,16 @@ def predict(options: PredictOptions) -> None:
         options.output,
     )  # fmt: skip
     from ...io.measurement.ghost_model_file import is_ghost_model_file
+    from ...workflow.flare_pictures import pictures_elsewhere
 
-    size = _sensor(options.sensor)
+    size, folder = _sensor(options.sensor), Path() if options.output is None else options.output.parent
     measured = is_ghost_model_file(options.subject)
-    project, flares = (None, _of_model(options, size)) if measured else _of_lens(options, size or (36.0, 24.0))
-    glare_of = project if options.glare else None
-    _curves(flares, wanted, glare_of, options.threads, options.output, options.as_json, options.cache, repr(options))
+    with pictures_elsewhere(
+        options.cluster, options.processes, options.threads, folder,
+        lambda line: print_remarks([line]),
+    ) as spread:  # fmt: skip
+        project, flares = (None, _of_model(options, size)) if measured else _of_lens(options, size or (36.0, 24.0))
+        _curves(flares, wanted, project if options.glare else None, options, unnamed, spread)
 
 
 def _given(options: PredictOptions, names: Sequence[str]) -> dict[str, Any]:
@@ -121,11 +131,9 @@ def _curves(
     flares: Flares,
     wanted: Wanted,
     glare_of: Project | None,
-    threads: int | None,
-    output: Path | None,
-    as_json: bool,
-    cache: Path | None,
+    options: PredictOptions,
     unnamed: str,
+    spread: Spread | None,
 ) -> None:
     """Predict the curves of one camera and print them."""
     from ...predict.occurrence import occurrence_data, predict_occurrence
@@ -137,16 +145,17 @@ def _curves(
             f"--to {wanted.to_deg:g} is beyond the range of this flare; choose degrees above "
             f"{flares.sampled.least_deg:g} and up to {reach:g}"
         )
+    output = options.output
     # pictures are kept until the page is written
-    with remembered(cache, output, unnamed) as memory:
+    with remembered(options.cache, output, unnamed) as memory:
         with progress_bar() as reported:
-            found = predict_occurrence(flares, wanted, reported, memory)
+            found = predict_occurrence(flares, wanted, reported, memory, spread)
         if glare_of is not None:
-            found = replace(found, glare=_glare(glare_of, threads))
+            found = replace(found, glare=_glare(glare_of, options.threads))
         print_remarks(dict.fromkeys(found.flare.remarks))
         if output is not None:
             write_text(output, occurrence_page(found))
-    if as_json:
+    if options.as_json:
         print_json({**occurrence_data(found), **({} if output is None else {"report": str(output)})})
         return
     _print(found)

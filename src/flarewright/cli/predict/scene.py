@@ -37,6 +37,8 @@ class SceneRequest:
     cache: Path | None = None
     unnamed: str = ""
     """Text that identifies the command, for the place of its partial work without an output."""
+    processes: int | None = None
+    cluster: str | None = None
 
 
 def is_scene(subject: str) -> bool:
@@ -67,25 +69,33 @@ def predict_scene(path: Path, request: SceneRequest) -> None:
     from ...predict.scene_data import scene_data
     from ...predict.search import best_position
     from ...predict.worst import render_worst
+    from ...workflow.flare_pictures import pictures_elsewhere
 
     scene = read_scene(path)
     _refuse_dark(path, scene)
     camera = None if request.near is None else _camera_number(scene, request.near)
     maker = partial(_named, quality=request.quality, threads=request.threads)
-    with naming(path):
-        _compile(scene, request.threads)
+    folder = Path() if request.output is None else request.output.parent
     # pictures are kept until the page is written
-    with remembered(request.cache, request.output, request.unnamed) as memory:
+    with (
+        pictures_elsewhere(
+            request.cluster, request.processes, request.threads, folder,
+            lambda line: print_remarks([line]),
+        ) as spread,
+        remembered(request.cache, request.output, request.unnamed) as memory,
+    ):  # fmt: skip
+        with naming(path):
+            _compile(scene, request.threads)
         with progress_bar() as reported:
             with naming(path):
-                plan = plan_scene(scene, partial(maker, shown=False), reported, memory)
+                plan = plan_scene(scene, partial(maker, shown=False), reported, memory, spread)
             ranked = ranking(plan)
             found = None
             if camera is not None:
-                found = best_position(plan, camera, request.radius_m, request.height_m, reported("position"))
+                found = best_position(plan, camera, request.radius_m, request.height_m, reported("position"), spread)
             worst: list[Worst] = []
             if request.output is not None:
-                worst = render_worst(plan, ranked, partial(maker, shown=True), reported("pictures"), memory)
+                worst = render_worst(plan, ranked, partial(maker, shown=True), reported("pictures"), memory, spread)
         shots = _shots(plan, request.shortest_shot_s)
         glare = [_glare(plan, c, request.threads) if request.glare else None for c in range(len(scene.cameras))]
         print_remarks(plan.remarks)

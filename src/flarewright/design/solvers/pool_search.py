@@ -64,6 +64,8 @@ class PoolState:
     next_run, searches : int
     seconds : float
         Total search time.
+    restarts : int
+        Number of independent searches whose best minima these are (`restarts`).
     """
 
     seed: int
@@ -72,6 +74,13 @@ class PoolState:
     next_run: int = 0
     searches: int = 0
     seconds: float = 0.0
+    restarts: int = 1
+
+    def fits(self, problem: Problem) -> bool:
+        """Return whether its lenses have as many rows as those of a problem."""
+        rows = problem.structures[0].rows
+        members = [one for run in self.runs for one in run.members] + list(self.ended)
+        return all(one.structure.rows == rows for one in members)
 
     @property
     def best(self) -> LensCandidate | None:
@@ -127,7 +136,7 @@ def solve(
     state = PoolState(seed) if state is None else state
     workers = min(threads or os.cpu_count() or 1, ACTIVE)
     with ThreadPoolExecutor(workers) as pool:
-        while not _done(state, most_searches):
+        while not finished(state, most_searches):
             state = _with_new_runs(state, problem)
             advanced = pool.map(partial(advance, problem=problem, seed=state.seed), state.runs)
             state = replace(state, runs=tuple(advanced))
@@ -141,7 +150,8 @@ def solve(
     return state
 
 
-def _done(state: PoolState, most_searches: int | None) -> bool:
+def finished(state: PoolState, most_searches: int | None) -> bool:
+    """Return whether a search has met its targets or made its number of local searches."""
     best = state.best
     if best is not None and best.cost <= SOLVED:
         return True

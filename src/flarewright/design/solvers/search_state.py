@@ -54,6 +54,8 @@ def write_state(state: PoolState, path: Path, name: str | None = None) -> None:
     }  # fmt: skip
     if name is not None:
         data["name"] = name
+    if state.restarts > 1:
+        data["restarts"] = state.restarts
     data["digest"] = _digest(data)
     text = json.dumps(data, allow_nan=False)
     write_text_atomically(path, text)
@@ -90,7 +92,7 @@ def read_search(path: Path) -> tuple[PoolState, str | None]:
         state = PoolState(
             int(data["seed"]), tuple(_run(run) for run in data["runs"]),
             tuple(_read_candidate(one) for one in data["ended"]), int(data["next_run"]), int(data["searches"]),
-            float(data["seconds"]),
+            float(data["seconds"]), int(data.get("restarts", 1)),
         )  # fmt: skip
         return state, data.get("name")
     except FileError as error:

@@ -63,7 +63,15 @@ class Cluster:
         return 0
 
     def work_off(
-        self, function: str, context: Any, items: Sequence[Any], *, processes: int, threads: int | None, what: str
+        self,
+        function: str,
+        context: Any,
+        items: Sequence[Any],
+        *,
+        processes: int,
+        threads: int | None,
+        what: str,
+        watch: Callable[[], None] | None = None,
     ) -> Iterator[Done]:
         """Call a function for each item on the workers; parameters and errors as of `processes.work_off`.
 
@@ -90,12 +98,17 @@ class Cluster:
                 pending[future.key] = (item, future)
                 future.add_done_callback(answers.put)
 
+        def look() -> None:
+            connection.watch()
+            if watch is not None:
+                watch()
+
         ahead = max(_AHEAD, _AHEAD_OF_WORKER * max(processes, self.workers))
         submit(ahead)
         looked = time.monotonic()
         try:
             while pending:
-                found = [next_answer(answers, connection.watch)]
+                found = [next_answer(answers, look)]
                 with suppress(Empty):
                     while True:
                         found.append(answers.get_nowait())
@@ -105,7 +118,7 @@ class Cluster:
                     connection.note_result()
                     yield Done(item, result_of(item, answer, what))
                 if time.monotonic() - looked > _WATCH_S:
-                    connection.watch()
+                    look()
                     looked = time.monotonic()
         finally:
             # forgotten futures are cancelled

@@ -8,4 +8,5 @@
 - `edge_blur`: `spread_marks`, convolution of a picture stored as differences with a flat shape
 - `pyramid`: `collect` and `add_doubled`, from blocks at several resolutions to pixels
 - `display_codes`: `encode`, `encode_sum`, `compress_gamut`: linear light to 8-bit codes
+- `perceived_hue`: `keep_hue` of a colour that is mixed with white
 """

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..jit.decorators import borrowing, compiled
+from .perceived_hue import keep_hue
 
 # filmic view: colours farther from grey than this part of the brightest channel are moved inwards
 KNEE = 0.9
@@ -33,10 +34,10 @@ def shown_color(red, green, blue, filmic):
     The largest distance of a channel from grey, d = (max - min) / max, exceeds 1 where a channel is negative. All three
     distances are scaled by the same factor, so the colour moves along the line to the grey of its largest channel: the
     dominant wavelength and the order of the channels stay. Without `filmic`, d is clipped at 1, which leaves colours in
-    gamut unchanged, and a colour brighter than white is white but for the part 1 / max, so it keeps its dominant
-    wavelength too; `filmic` uses the smooth knee of the ACES reference gamut compression,
-    k + (1 - k) x / (1 + x^p)^(1/p) with x = (d - k) / (1 - k) and p = 1.2 (Academy S-2020-001), whose limit is 1. The
-    largest channel rolls off by s + (1 - s) u / (1 + u), u = (v - s) / (1 - s), the others in proportion.
+    gamut unchanged, and a colour brighter than white is white but for the part 1 / max; `filmic` uses the smooth knee
+    of the ACES reference gamut compression, k + (1 - k) x / (1 + x^p)^(1/p) with x = (d - k) / (1 - k) and p = 1.2
+    (Academy S-2020-001), whose limit is 1. The largest channel rolls off by s + (1 - s) u / (1 + u), u = (v - s) / (1 -
+    s), the others in proportion. What is mixed with white keeps its hue as it is seen (`perceived_hue.keep_hue`).
     """
     zero, one = np.float32(0.0), np.float32(1.0)
     red, green, blue = _bounded(red), _bounded(green), _bounded(blue)
@@ -52,7 +53,9 @@ def shown_color(red, green, blue, filmic):
             # clipping each channel would make a bright blue magenta
             part = one / high
             white = one - part
-            red, green, blue = white + red * part * part, white + green * part * part, white + blue * part * part
+            return keep_hue(
+                red, green, blue, white + red * part * part, white + green * part * part, white + blue * part * part
+            )
         return min(max(red, zero), one), min(max(green, zero), one), min(max(blue, zero), one)
     tone, bend = high, np.float32(SHOULDER)
     if high > bend:
@@ -62,7 +65,9 @@ def shown_color(red, green, blue, filmic):
     colored = np.float32(HALF_WHITE) / (np.float32(HALF_WHITE) + over)
     scale = tone / high * colored
     grey = tone * (one - colored)
-    red, green, blue = grey + red * scale, grey + green * scale, grey + blue * scale
+    if over > zero:
+        return keep_hue(red, green, blue, grey + red * scale, grey + green * scale, grey + blue * scale)
+    red, green, blue = red * scale, green * scale, blue * scale
     return min(max(red, zero), one), min(max(green, zero), one), min(max(blue, zero), one)
 
 

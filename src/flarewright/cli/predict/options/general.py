@@ -32,4 +32,11 @@ class GeneralOptions:
         ),
     ] = None
     threads: Annotated[int | None, typer.Option(min=1, help="Number of threads (default: all cores).")] = None
+    processes: Annotated[
+        int | None, typer.Option(min=1, help="Number of processes that draw pictures (default: 1).")
+    ] = None
+    cluster: Annotated[
+        str | None,
+        typer.Option(metavar="WHERE", help="Draw on a Dask cluster: local:N, tcp://HOST:PORT or slurm:FILE."),
+    ] = None
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False
