@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flarewright.colorimetry import VISIBLE_NM
 from flarewright.kernels.paraxial.ghosts import RIM
 from flarewright.kernels.raster.bundle import draw_bundle, node_densities
 from flarewright.kernels.raster.polygons import sum_rows
@@ -47,7 +48,7 @@ from flarewright.model import (
 from flarewright.model.project.light import Spectrum, Tabulated
 from flarewright.optics.colour.cie1931 import cie_1931
 from flarewright.optics.colour.rgb import xyz_to_rgb_matrix
-from flarewright.optics.colour.spectrum import VISIBLE_NM, spectral_power
+from flarewright.optics.colour.spectrum import spectral_power
 from flarewright.optics.lens.paths import LightPath, ghost_paths
 from flarewright.optics.rays.bundle import Refinement, trace_bundle, trace_grid
 from flarewright.optics.rays.pack import facing, resolve_coatings

@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -119,6 +120,8 @@ def run(folder: Path, words: list[str]) -> int:
 
 def table(folder: Path, by: str, most: int) -> int:
     """Print the most expensive rows, and the total."""
+    # as other programs do when `head` has read enough
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     sums: dict[str, list[float]] = defaultdict(lambda: [0.0] * 4)
     tests: dict[str, set[str]] = defaultdict(set)
     processes = []

@@ -83,6 +83,15 @@ def naming(file: str | PathLike[str]) -> Iterator[None]:
         raise type(error)(f"{file}: {error}", error.problems) from None
 
 
+@contextmanager
+def raised_as(kind: type[FlarewrightError]) -> Iterator[None]:
+    """Raise a ValueError of the block, such as a `FileError`, as an error of another class with the same message."""
+    try:
+        yield
+    except ValueError as error:
+        raise kind(str(error)) from error
+
+
 def optional(
     module: str, extra: str, what: str, *, kind: type[FlarewrightError] = FlarewrightError, hint: str = ""
 ) -> Any:

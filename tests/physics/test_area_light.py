@@ -158,7 +158,11 @@ def test_shares_go_by_solid_angle():
     assert sum(part.share for part in pieces) == pytest.approx(1.0)
     # the solid angle of a square of half width a at distance 1: 4 asin(a^2 / (1 + a^2))
     a = np.tan(np.radians(40.0))
-    inner = [part.share for part in pieces if np.abs(part.slope + part.corners).max() < 0.5 * a * (1.0 + 1e-9)]
+    inner = [
+        part.share
+        for part in pieces
+        if np.abs(np.tan(np.radians(part.field_deg)) + part.corners).max() < 0.5 * a * (1.0 + 1e-9)
+    ]
     whole, half = (4.0 * np.arcsin(x * x / (1.0 + x * x)) for x in (a, 0.5 * a))
     assert sum(inner) == pytest.approx(half / whole, rel=2e-3)
 

@@ -13,6 +13,7 @@ import colour
 import numpy as np
 import pytest
 
+from flarewright.colorimetry import VISIBLE_NM
 from flarewright.kernels.raster.polygons import sum_rows
 from flarewright.model import (
     D65,
@@ -31,7 +32,7 @@ from flarewright.model import (
     Tabulated,
 )
 from flarewright.optics.colour.cie1931 import cie_1931
-from flarewright.optics.colour.spectrum import VISIBLE_NM, spectral_power
+from flarewright.optics.colour.spectrum import spectral_power
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.render.ghosts.paraxial_ghosts import draw_draft
 from flarewright.render.ghosts.traced_ghosts import draw_final, find_final

@@ -136,17 +136,11 @@ def _settings(path: Path, seed: int | None) -> DatasetSpec:
         return settings
     if seed >= 2**63:
         raise ProjectError(f"--seed {seed} is too large; choose one below {2**63}")
-    changed: DatasetSpec = settings.replace(seed=seed)
-    return changed
+    return settings.replace(seed=seed)
 
 
 def _preview(
-    settings: DatasetSpec,
-    preview: Path,
-    spec: Path,
-    items: int | None,
-    threads: int | None,
-    as_json: bool,
+    settings: DatasetSpec, preview: Path, spec: Path, items: int | None, threads: int | None, as_json: bool
 ) -> None:
     """Write a contact sheet."""
     from ..io.images.png import write_png

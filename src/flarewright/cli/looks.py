@@ -26,8 +26,7 @@ _COLUMNS = 32
 
 
 def looks(
-    context: typer.Context,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    context: typer.Context, as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False
 ) -> None:
     """List the shipped looks, with pictures on a terminal with enough colours."""
     if context.invoked_subcommand is not None:

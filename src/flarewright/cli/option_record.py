@@ -46,10 +46,7 @@ def with_options(kind: type[Record]) -> Callable[[Callable[[Record], None]], Cal
     lists = {name for name, hint in hints.items() if get_origin(hint.__origin__) is list}
     parameters = [
         Parameter(
-            each.name,
-            Parameter.KEYWORD_ONLY,
-            default=_default(each, each.name in lists),
-            annotation=hints[each.name],
+            each.name, Parameter.KEYWORD_ONLY, default=_default(each, each.name in lists), annotation=hints[each.name]
         )
         for each in fields(kind)  # type: ignore[arg-type]
         if each.name in hints

@@ -7,8 +7,6 @@ import sys
 import time
 from typing import Any
 
-__all__ = ["ProgressLines"]
-
 
 class ProgressLines:
     """Prints one JSON object for each finished item, with an estimate of the time that is left.

@@ -33,17 +33,8 @@ __all__, __getattr__, __dir__ = lazy_names(
     {
         ".problem.problem": ("Problem",),
         ".problem.target": ("problem_of",),
-        ".solvers.pool_search": (
-            "PoolState",
-            "solve",
-        ),
-        ".finishing.candidate": (
-            "Outcome",
-            "outcomes",
-        ),
-        ".results.identify": (
-            "Identification",
-            "identify",
-        ),
+        ".solvers.pool_search": ("PoolState", "solve"),
+        ".finishing.candidate": ("Outcome", "outcomes"),
+        ".results.identify": ("Identification", "identify"),
     },
 )

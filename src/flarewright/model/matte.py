@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from ..typing import Pixels
 
-__all__ = ["GhostMatte"]
-
 
 @dataclass(frozen=True)
 class GhostMatte:

@@ -16,8 +16,6 @@ from ..model import Layer
 from ..typing import Pixels
 from .detection import plate_luminance
 
-__all__ = ["STARBURST", "composed", "source_mask"]
-
 STARBURST = "starburst"
 """Name of the layer that shows the light itself."""
 

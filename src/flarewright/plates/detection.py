@@ -15,8 +15,6 @@ from ..errors import ProjectError
 from ..optics.colour.rgb import luminance_weights
 from ..typing import Floats, Indices, Mask, Pixels
 
-__all__ = ["LUMINANCE", "DetectionSettings", "Sources", "find_sources", "mean_luminance", "plate_luminance"]
-
 LUMINANCE = luminance_weights("rec709")
 """Luminance of linear Rec.709."""
 # places at which a change of colour is searched
@@ -96,8 +94,7 @@ class Sources:
 
 def plate_luminance(pixels: Pixels) -> Pixels:
     """Return the luminance of linear Rec.709 pixels, negative values as 0, shape (H, W)."""
-    found: Pixels = np.maximum(pixels, 0.0) @ LUMINANCE.astype(np.float32)
-    return found
+    return np.maximum(pixels, 0.0) @ LUMINANCE.astype(np.float32)
 
 
 def mean_luminance(pixels: Pixels) -> float:

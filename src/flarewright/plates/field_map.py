@@ -27,8 +27,6 @@ from ..render.scene.pixel_place import (
 from ..render.scene.resolve import ResolvedProject
 from ..typing import Floats
 
-__all__ = ["FieldMap", "field_map"]
-
 # traced places along the radius, and along each side of the picture
 _RADII, _SIDE = 21, 9
 _LEAST_RADII = 4

@@ -14,8 +14,6 @@ from ..typing import Floats, Indices, Mask
 from .detection import LUMINANCE
 from .tracking import Tracks
 
-__all__ = ["JoinSettings", "joined"]
-
 
 @dataclass(frozen=True)
 class JoinSettings:

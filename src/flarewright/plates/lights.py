@@ -23,8 +23,6 @@ from .field_map import FieldMap
 from .settings import SUNLIT_LX, SourceKind
 from .tracking import Tracks
 
-__all__ = ["PlateTracks", "lights_at", "plate_factor", "plate_tracks"]
-
 # sources narrower than these are points: part of the plate's width, pixels
 _POINT_PART, _POINT_PX = 0.005, 3.0
 # largest ratio of the axes of a disc

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from ..typing import Floats
 from .lights import PlateTracks
 
-__all__ = ["light_rows", "marked_plate"]
-
 # display codes of the marks, and of the plate under them
 _MARK, _DIMMED = (60, 230, 90), 0.6
 # least half width of an outline, and its distance from the light, pixels

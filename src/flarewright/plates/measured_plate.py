@@ -9,8 +9,6 @@ from ..model.project.camera import Colorspace
 from ..optics.colour.rgb import xyz_to_rgb_matrix
 from ..typing import Floats, Pixels
 
-__all__ = ["converted", "expanded", "measured_pixels"]
-
 
 def converted(plate: PlatePicture, colorspace: Colorspace) -> Pixels:
     """Return the pixels of a plate with the primaries of a colour space.
@@ -25,8 +23,7 @@ def converted(plate: PlatePicture, colorspace: Colorspace) -> Pixels:
     if stated == colorspace:
         return plate.pixels
     matrix = _matrix(stated, colorspace).astype(np.float32)
-    found: Pixels = plate.pixels @ matrix.T
-    return found
+    return plate.pixels @ matrix.T
 
 
 def _matrix(source: Colorspace, target: Colorspace) -> Floats:
@@ -57,8 +54,7 @@ def expanded(values: Pixels, highlights: float, white: float = 1.0) -> Pixels:
     [0.009999999776482582, 0.9800000190734863, 50.0]
     """
     part = np.clip(values, 0.0, white)
-    found: Pixels = (part / (1.0 - np.float64(1.0 / white - 1.0 / highlights) * part)).astype(np.float32)
-    return found
+    return (part / (1.0 - np.float64(1.0 / white - 1.0 / highlights) * part)).astype(np.float32)
 
 
 def measured_pixels(plate: PlatePicture, highlights: float | None) -> Pixels:

@@ -9,8 +9,6 @@ from typing import Literal
 from ..errors import ProjectError
 from ..io.images.transfer import Transfer
 
-__all__ = ["PlateSettings", "SourceKind", "parse_source"]
-
 
 @dataclass(frozen=True)
 class SourceKind:

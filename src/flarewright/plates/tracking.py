@@ -19,8 +19,6 @@ from scipy.spatial import cKDTree
 from ..typing import Floats
 from .detection import LUMINANCE, Sources
 
-__all__ = ["TrackingSettings", "Tracks", "follow", "steady"]
-
 
 @dataclass(frozen=True)
 class TrackingSettings:
@@ -78,10 +76,7 @@ class Tracks:
 
 
 def follow(
-    frames: Sequence[int],
-    found: Sequence[Sources],
-    width_px: int,
-    settings: TrackingSettings | None = None,
+    frames: Sequence[int], found: Sequence[Sources], width_px: int, settings: TrackingSettings | None = None
 ) -> Tracks:
     """Match the sources of neighbouring frames.
 

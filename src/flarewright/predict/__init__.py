@@ -47,30 +47,11 @@ if TYPE_CHECKING:
 __all__, __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        ".curves": (
-            "Curves",
-            "sample_curves",
-        ),
-        ".flare": (
-            "Flare",
-            "Frame",
-        ),
-        ".lens_flare": (
-            "lens_flare",
-            "square_flare",
-        ),
-        ".occurrence": (
-            "Flares",
-            "Occurrence",
-            "Setting",
-            "Wanted",
-            "predict_occurrence",
-        ),
-        ".plan": (
-            "Plan",
-            "plan_scene",
-            "ranking",
-        ),
+        ".curves": ("Curves", "sample_curves"),
+        ".flare": ("Flare", "Frame"),
+        ".lens_flare": ("lens_flare", "square_flare"),
+        ".occurrence": ("Flares", "Occurrence", "Setting", "Wanted", "predict_occurrence"),
+        ".plan": ("Plan", "plan_scene", "ranking"),
         ".switching": ("choose_cameras",),
     },
 )

@@ -9,8 +9,6 @@ from ..typing import Floats
 WASHED = 0.9
 """Part of the contrast; where less remains, flare counts as visible."""
 
-__all__ = ["WASHED", "Contrast", "contrast", "washed_share"]
-
 
 @dataclass(frozen=True)
 class Contrast:

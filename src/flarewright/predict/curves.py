@@ -21,8 +21,6 @@ FAINT = 1e-3
 # ratio of adjacent samples that counts as a discontinuity
 CLIFF = 30.0
 
-__all__ = ["Check", "Curves", "bins_of", "check_curves", "sample_curves"]
-
 
 @dataclass(frozen=True)
 class Curves:
@@ -71,12 +69,6 @@ class Check:
     constellation_deg: Floats
     predicted: Floats
     rendered: Floats
-
-    @property
-    def ratio(self) -> Floats:
-        """Predicted over rendered, shape (M, 5); NaN where the render is black."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(np.where(self.rendered > 0.0, self.predicted / self.rendered, np.nan))
 
 
 def interpolated_statistics(a: Floats, b: Floats, part: float) -> Floats:

@@ -20,8 +20,6 @@ from ..typing import Floats, Mask, Pixels
 # of the direct image and leaves out the surroundings of the light instead
 NO_FLARE = ("beauty", "starburst")
 
-__all__ = ["Flare", "Frame", "fingerprint_of", "luminance"]
-
 
 def fingerprint_of(*inputs: str) -> str:
     """Return a hash of what a flare is drawn from, and of the program's version, whose pictures may differ.

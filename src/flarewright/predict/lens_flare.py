@@ -23,8 +23,6 @@ LEAST_FRONT = 2.0
 # width in pixels of pictures for statistics; a flare is smooth except for its brightest spots
 SIDE_PX = 192
 
-__all__ = ["largest_constellation", "lens_flare", "luminous", "square_flare", "statistics_quality"]
-
 
 def statistics_quality(mode: str) -> Quality:
     """Return the quality of renders for statistics, coarse where averages do not change.
@@ -49,8 +47,7 @@ def luminous(project: Project, quality: Quality) -> Project:
     """
     light = project.lights[0]
     lines = luminous_lines(light.spectrum, quality.wavelengths)
-    same: Project = project.replace(lights=(light.replace(spectrum=lines),), quality=quality)
-    return same
+    return project.replace(lights=(light.replace(spectrum=lines),), quality=quality)
 
 
 def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
@@ -160,8 +157,7 @@ def square_flare(project: Project, quality: Quality, *, threads: int | None = No
 
 
 def _square(project: Project, frame: Frame) -> Camera:
-    square: Camera = project.camera.replace(size_px=(SIDE_PX, SIDE_PX), sensor_mm=(frame.diagonal, frame.diagonal))
-    return square
+    return project.camera.replace(size_px=(SIDE_PX, SIDE_PX), sensor_mm=(frame.diagonal, frame.diagonal))
 
 
 def _turns_by(settled: ResolvedProject) -> float | None:

@@ -20,8 +20,6 @@ from .table import FlareTable
 # number of pictures in the report
 SHOWN = 8
 
-__all__ = ["Flares", "Occurrence", "Setting", "Wanted", "contrast_curve", "occurrence_data", "predict_occurrence"]
-
 
 @dataclass(frozen=True)
 class Flares:

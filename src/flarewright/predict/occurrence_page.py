@@ -27,8 +27,6 @@ WORDS = {
 _DRAWN = ("sum_mm2", "mean", "maximum", "log_average")
 _ANGLE = "constellation, degrees from the axis"
 
-__all__ = ["WORDS", "occurrence_page", "shown_together"]
-
 
 def occurrence_page(found: Occurrence) -> str:
     """Return the report of a prediction.

@@ -10,8 +10,6 @@ from ..typing import Floats
 CLIPPING_LX_S = 78.0
 """Exposure at which a sensor of ISO 1 clips, lx s (ISO 12232, saturation-based speed: S = 78 / H_sat)."""
 
-__all__ = ["CLIPPING_LX_S", "beam", "disc_illuminance", "exposure_level", "point_illuminance"]
-
 
 def point_illuminance(intensity_cd: float, distance_m: Floats) -> Floats:
     """Compute the illuminance on a plane facing a small lamp: I / d^2, lx."""

@@ -19,8 +19,6 @@ Luminance; in colour for a fingerprint with `IN_COLOUR`.
 """
 IN_COLOUR = "-rgb"
 
-__all__ = ["Drawn", "Memory", "PictureRequest", "Spread", "draw_all", "in_colour"]
-
 
 @dataclass(frozen=True)
 class PictureRequest:

@@ -28,20 +28,6 @@ NEAR = 50.0
 # change of distance, as a factor, below which ghosts hardly change
 STAYS = 2.0
 
-__all__ = [
-    "FlareMaker",
-    "Pair",
-    "Plan",
-    "Ranked",
-    "near_or_far",
-    "plan_scene",
-    "ranking",
-    "requests_of",
-    "rounded_diameter",
-    "rounded_distance",
-    "tables_of",
-]  # fmt: skip
-
 
 @dataclass(frozen=True)
 class Pair:
@@ -167,26 +153,10 @@ class Ranked:
     brightest_stops: float | None = None
 
 
-def tables_of(
+def _tables_of(
     scene: Scene, seen: Sequence[Sequence[CameraSighting]], maker: FlareMaker, memory: Memory | None = None
 ) -> tuple[tuple[FlareTable, ...], ...]:
-    """Build the tables of all cameras and lights; equal flares share their pictures.
-
-    Parameters
-    ----------
-    scene : Scene
-    seen : sequence of sequence of Sighting
-    maker : callable
-        Maps (camera, light, diameter_deg, distance_m) to a flare for tables and the camera's frame; a distance of None
-        is infinite.
-    memory : dict, optional
-        Pictures drawn before, by the flares' fingerprints; new ones are added.
-
-    Returns
-    -------
-    tuple of tuple of FlareTable
-        By camera and light.
-    """
+    """Build the tables of all cameras and lights; equal flares share their pictures."""
     known: Memory = {} if memory is None else memory
     out = []
     for camera, row in zip(scene.cameras, seen, strict=True):
@@ -244,11 +214,12 @@ def plan_scene(
     ----------
     scene : Scene
     maker : callable
-        As in `tables_of`.
+        Maps (camera, light, diameter_deg, distance_m) to a flare for tables and the camera's frame; a distance of None
+        is infinite.
     reported : callable
         Called with the name of a part of the work; returns the progress callback of that part.
     memory : dict, optional
-        As in `tables_of`.
+        Pictures drawn before, by the flares' fingerprints; new ones are added.
     spread : callable, optional
         Draws pictures by other processes; the plan does not depend on it.
 
@@ -264,7 +235,7 @@ def plan_scene(
     times, dates = moments(scene)
     tracks = tuple(camera_track(one, times, f"cameras[{c}] ({one.name})") for c, one in enumerate(scene.cameras))
     seen = sightings(scene, tracks, times, dates)
-    tables = tables_of(scene, seen, maker, memory)
+    tables = _tables_of(scene, seen, maker, memory)
     # all pictures that the sightings need, so that the progress is known
     pairs_of = (
         (table, sighting) for row in zip(tables, seen, strict=True) for table, sighting in zip(*row, strict=True)

@@ -15,8 +15,6 @@ from .statistics import NAMES
 from .switching import Shot
 from .worst import Worst
 
-__all__ = ["found_words", "scene_data", "time_words", "unknown_share"]
-
 
 def time_words(plan: Plan, index: int) -> str:
     """Format a time of a plan: the clock time if the scene has one, otherwise seconds."""

@@ -28,8 +28,6 @@ DARKEST_SHOWN, FEWEST_SHOWN = 6, 60
 # colour of tried positions whose flare is unknown
 _UNKNOWN = "#c3ccd4"
 
-__all__ = ["scene_page"]
-
 
 def scene_page(
     plan: Plan, ranked: Sequence[Ranked], shots: Sequence[Shot], found: BestPosition | None, worst: Sequence[Worst]

@@ -21,8 +21,6 @@ FIRST, ROUNDS, LATER, SMALLER = 61, 4, 16, 0.4
 # largest number of times that are evaluated, evenly chosen
 MOMENTS = 24
 
-__all__ = ["WORTH", "BestPosition", "best_position"]
-
 
 @dataclass(frozen=True)
 class BestPosition:

@@ -14,8 +14,6 @@ FLOOR = 1e-9
 """Added before the logarithm so that black pixels do not give minus infinity. It is 30 stops below the light's
 irradiance, the least value that a sensor could distinguish from black."""
 
-__all__ = ["FLOOR", "Statistics", "covered_area", "measure"]
-
 
 @dataclass(frozen=True)
 class Statistics:

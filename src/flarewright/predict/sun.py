@@ -15,8 +15,6 @@ from ..typing import Floats
 # illuminance on a plane facing the sun outside the atmosphere, lx, and extinction of the clear sky per air mass
 OUTSIDE_LX, CLEAR = 127500.0, 0.21
 
-__all__ = ["sun_illuminance", "sun_path"]
-
 
 def sun_path(site: Site, times: Sequence[datetime]) -> tuple[Floats, Floats]:
     """Compute the position of the sun.

@@ -8,8 +8,6 @@ import numpy as np
 
 from ..typing import Floats
 
-__all__ = ["Shot", "choose_cameras", "switching"]
-
 
 @dataclass(frozen=True)
 class Shot:

@@ -18,8 +18,6 @@ PHASES, ROLL_STEP_DEG = 4, 15.0
 # decimals of a degree to which angles are rounded
 DECIMALS = 4
 
-__all__ = ["FlareTable"]
-
 
 @dataclass(frozen=True)
 class FlareTable:

@@ -16,8 +16,6 @@ from ..typing import Floats, Mask
 from .photometry import beam, disc_illuminance, point_illuminance
 from .sun import sky_direction, sun_illuminance, sun_path
 
-__all__ = ["CameraSighting", "CameraTrack", "camera_track", "moments", "moved_by", "sightings"]
-
 
 @dataclass(frozen=True)
 class CameraTrack:

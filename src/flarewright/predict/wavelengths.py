@@ -11,8 +11,6 @@ from ..optics.colour.cie1931 import cie_1931
 from ..optics.colour.spectrum import luminance_shares
 from ..typing import Floats
 
-__all__ = ["luminous_lines"]
-
 
 @lru_cache(maxsize=64)
 def luminous_lines(spectrum: Spectrum, count: int) -> Lines:

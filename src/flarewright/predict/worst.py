@@ -16,8 +16,6 @@ from .plan import FlareMaker, Plan, Ranked, near_or_far
 # largest number of pairs of camera and light
 PICTURES = 6
 
-__all__ = ["Worst", "render_worst"]
-
 
 @dataclass(frozen=True)
 class Worst:

@@ -523,6 +523,3 @@ def _light_summary(project: Project, number: int, parts: list[tuple[Shot, Direct
         "direct_throughput_mm2": [float(flux) for flux in throughput],
         "transmittance": float(weights @ [image.transmittance for _, image in parts]),
     }
-
-
-__all__ = ["Rendering", "check_finite", "render"]

@@ -20,10 +20,7 @@ FIRST = "first run: the kernels are compiled once, in some 10 to 40 seconds; fla
 
 
 def compile_for_render(
-    project: Project,
-    threads: int | None = None,
-    report: Report | None = None,
-    shown: Shown | None = None,
+    project: Project, threads: int | None = None, report: Report | None = None, shown: Shown | None = None
 ) -> None:
     """Compile the kernels of a render that are not compiled yet.
 

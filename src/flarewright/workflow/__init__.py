@@ -58,15 +58,8 @@ __all__, __getattr__, __dir__ = lazy_names(
     __name__,
     {
         ".flare_curves": ("flare_curves",),
-        ".lens_flares": (
-            "camera_project",
-            "lens_flares",
-            "scene_flare",
-        ),
-        ".lens_search": (
-            "LensSearch",
-            "search_lenses",
-        ),
+        ".lens_flares": ("camera_project", "lens_flares", "scene_flare"),
+        ".lens_search": ("LensSearch", "search_lenses"),
         ".light_places": ("lights_at_pixels", "with_tracks"),
         ".measure_provenance": ("STAGES",),
         ".measure_run": ("StageResult", "run_stages"),

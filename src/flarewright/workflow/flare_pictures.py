@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from ..predict.pictures import PictureRequest, Spread
     from ..typing import Pixels
 
-__all__ = ["draw_picture", "pictures_elsewhere"]
-
 _DRAW = "flarewright.workflow.flare_pictures:draw_picture"
 # flares that a process keeps; one with its lens takes some megabytes
 _MOST_FLARES = 64

@@ -7,8 +7,6 @@ from typing import Any
 from ..jobs.frame_list import FramePattern
 from ..model import Project
 
-__all__ = ["holdout_files", "with_frame_files"]
-
 
 def holdout_files(project: Project) -> tuple[str, ...]:
     """Return the files that hide lights of a project, or names with a place for the number of the frame."""
@@ -35,8 +33,7 @@ def with_frame_files(project: Project, frame: float) -> Project:
             light if light.holdout is None else light.replace(holdout=_numbered(light.holdout, number))
             for light in project.lights
         )
-    found: Project = project.replace(**changes) if changes else project
-    return found
+    return project.replace(**changes) if changes else project
 
 
 def _numbered(holdout: Any, frame: int) -> Any:

@@ -15,10 +15,6 @@ from ..io.project.project_file import validation_messages
 from ..model import BlackBody, Iris, Light, Project, Rgb, Timeline
 from ..model.project.animation import Curve, Motion
 
-__all__ = [
-    "frame_rate", "is_still", "length_s", "light_at", "peak_intensity", "project_at", "still", "time_of", "value_at",
-]  # fmt: skip
-
 
 def value_at(at_s: float, times_s: Sequence[float], values: Sequence[float], motion: Motion = "linear") -> float:
     """Interpolate keys at a time.
@@ -78,8 +74,7 @@ def light_at(light: Light, at_s: float) -> Light:
                 changes["spectrum"] = Rgb(rgb=found)
             case "temperature_k":
                 changes["spectrum"] = BlackBody(temperature_k=found)
-    placed: Light = light.replace(**changes) if changes else light
-    return placed
+    return light.replace(**changes) if changes else light
 
 
 def project_at(project: Project, at_s: float) -> Project:
@@ -127,8 +122,7 @@ def project_at(project: Project, at_s: float) -> Project:
 def still(project: Project) -> Project:
     """Return a project without keyframes and curves: what one frame shows."""
     lights = tuple(light.replace(keyframes=(), motion="linear", curves=()) for light in project.lights)
-    found: Project = project.replace(lights=lights, curves=(), timeline=Timeline())
-    return found
+    return project.replace(lights=lights, curves=(), timeline=Timeline())
 
 
 def is_still(project: Project) -> bool:

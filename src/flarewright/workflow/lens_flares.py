@@ -41,8 +41,7 @@ def lens_flares(project: Project, quality: str, threads: int | None) -> Flares:
 
 def shown_project(project: Project) -> Project:
     """Return a project in the quality of renders for viewing."""
-    shown: Project = project.replace(quality={"mode": "final", "wavelengths": SHOWN_NM})
-    return shown
+    return project.replace(quality={"mode": "final", "wavelengths": SHOWN_NM})
 
 
 def scene_flare(

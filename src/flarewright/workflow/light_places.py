@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from ..render.scene.pixel_place import DirectImages
     from ..typing import Progress
 
-__all__ = ["LightFinder", "assigned", "lights_at_pixels", "resting_tracks", "timeline_of_tracks", "with_tracks"]
-
 # curves of a project that move the direct image of a light: all but the gains, which change only its brightness
 _LENS_CURVES = frozenset({"zoom", "focus_distance", "f_number", "rotation_deg"})
 # a light in a 3D scene is never farther from the axis than this, degrees
@@ -86,11 +84,6 @@ class LightFinder:
             self._images[key] = direct_images(self._settled, light)
         return field_angles_at(self._images[key], place_px, near_deg)
 
-    @property
-    def efl_mm(self) -> float | None:
-        """Focal length of the lens; None for a measured flare."""
-        return None if self._settled is None else self._settled.order.efl
-
 
 def lights_at_pixels(
     project: Project, places: Mapping[int, tuple[float, float]], counted_px: tuple[int, int] | None = None
@@ -128,8 +121,7 @@ def lights_at_pixels(
     for index, place in places.items():
         light = lights[index]
         lights[index] = light.replace(field_deg=finder.angles_at(light, _shifted(place, counted_px, project)))
-    moved: Project = project.replace(lights=tuple(lights))
-    return moved
+    return project.replace(lights=tuple(lights))
 
 
 def resting_tracks(project: Project, places: Mapping[int, tuple[float, float]]) -> list[tuple[int, Track]]:
@@ -359,8 +351,7 @@ def _moved(light: Light, track: Track, keys: list[LightKey], project: Project, k
     }  # fmt: skip
     if track.diameter_deg > 0.0 and not light.extended:
         changes["diameter_deg"] = track.diameter_deg
-    moved: Light = light.replace(**changes)
-    return moved
+    return light.replace(**changes)
 
 
 def _check_times(track: Track, project: Project) -> None:

@@ -13,8 +13,6 @@ from ..jobs.worker import WRITING
 from ..measure.pipeline.merge_stage import FrameOutcome, MergePlan, merge_captures, merge_frame
 from ..model.measurement.capture import Capture, MergedRun
 
-__all__ = ["frame_on_worker", "merge_on"]
-
 _MERGE = "flarewright.workflow.measure_merge:frame_on_worker"
 
 

@@ -20,8 +20,6 @@ from ..render.scene.resolve import resolve_project
 from ..render.scene.shots import make_shots
 from ..typing import Floats, Pixels
 
-__all__ = ["MOST_SUBFRAMES", "MeanMatte", "mean_layers", "motion_px", "subframe_count", "subframe_times"]
-
 MOST_SUBFRAMES = 64
 """Largest number of sub-frames that is chosen automatically."""
 STEP_PX = 1.0

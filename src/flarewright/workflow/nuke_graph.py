@@ -162,6 +162,3 @@ def nodes_text(nodes: Sequence[Node], indent: str = "") -> str:
 def layers_text(layers: Sequence[str]) -> str:
     """Return the lines that declare layers with red, green and blue."""
     return "".join(f"add_layer {{{name} {name}.red {name}.green {name}.blue}}\n" for name in layers)
-
-
-__all__ = ["Node", "Passes", "flare_nodes", "layers_text", "nodes_text", "quoted"]

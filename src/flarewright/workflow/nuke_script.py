@@ -279,6 +279,3 @@ def _gizmo_text(name: str, flare: Passes, graded: tuple[str, ...], gain: float) 
     ]
     head = "\n".join([f"version {_NUKE_VERSION}", *lines, "}"])
     return f"{head}\n{layers_text((*flare.passes, *flare.singles))}{nodes_text(nodes, ' ')}end_group\n"
-
-
-__all__ = ["NukeScript", "nuke_script"]

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import FlarewrightError
+from ..errors import FlarewrightError, ProjectError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,7 +36,6 @@ def open_project_files(file: Path, project: Project) -> ResolvedProject:
     """
     from ..io.files.sentences import summary
     from ..io.images.mask_image import read_mask
-    from ..io.project.project_file import ProjectFileError
     from ..optics.rays.pack import resolve_coatings
     from ..render.scattering.scatter_pass import check_scatter
     from ..render.scene.art_rules import resolve_art
@@ -63,5 +62,5 @@ def open_project_files(file: Path, project: Project) -> ResolvedProject:
     if len(errors) == 1:
         raise next(iter(errors.values()))
     if errors:
-        raise ProjectFileError(summary(str(file), list(errors)), tuple(errors))
+        raise ProjectError(summary(str(file), list(errors)), tuple(errors))
     return settled

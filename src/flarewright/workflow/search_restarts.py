@@ -27,17 +27,6 @@ if TYPE_CHECKING:
     from ..jobs.cluster.executor import Cluster
     from ..typing import Report
 
-__all__ = [
-    "FOLDER",
-    "Ended",
-    "Restart",
-    "RestartPlan",
-    "Sharing",
-    "restart_on_worker",
-    "search_restart",
-    "search_restarts",
-]
-
 FOLDER = "restarts"
 """Folder, in that of a search, with the states of its restarts."""
 _SEARCH = "flarewright.workflow.search_restarts:restart_on_worker"

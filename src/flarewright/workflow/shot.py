@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from .plates.plate_sources import PlateShot
     from .shot_frame import FrameResult, ShotPlan
 
-__all__ = ["ShotResult", "parsed_frames", "shot", "shot_frames"]
-
 _DRAW = "flarewright.workflow.shot_frame:draw_frame"
 # remarks that are kept; each frame can have some
 _MOST_REMARKS = 20

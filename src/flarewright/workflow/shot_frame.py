@@ -33,8 +33,6 @@ from .motion_blur import MeanMatte, mean_layers, subframe_count, subframe_times
 if TYPE_CHECKING:
     from .plates.plate_sources import PlateShot
 
-__all__ = ["FrameResult", "ShotPlan", "draw_frame", "frame_project", "part_name"]
-
 # samples over the open shutter from which the number of sub-frames is chosen
 _SAMPLES = 5
 

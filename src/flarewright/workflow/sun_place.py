@@ -12,8 +12,6 @@ from ..model.project.scene import Site
 from ..predict.sun import sky_direction, sun_illuminance, sun_path
 from ..typing import Floats
 
-__all__ = ["CameraAim", "SunPlace", "sun_place"]
-
 # elevation at which the upper edge of the sun sets, degrees; `sun_path` includes refraction
 _SETTING_DEG = -0.27
 # largest angle from the camera's axis: its field angles reach 90 degrees

@@ -53,7 +53,7 @@ def test_the_cost_is_the_error_of_drawn_pictures(direction, blades):
     ends, costs = polish_within(known, points, aim, 0)
     assert np.array_equal(ends, np.clip(points, known.low, known.high))
     wanted = drawn(TARGETS[:, 0], TARGETS[:, 1], 0.6 / np.abs(TARGETS[:, 1]), direction, np.full(5, blades))
-    assert 1.0 / picture.unit == pytest.approx(np.mean(wanted**2), rel=0.02)
+    assert 1.0 / picture.shown.unit == pytest.approx(np.mean(wanted**2), rel=0.02)
     for x, cost in zip(ends, costs, strict=True):
         values = evaluate(structure, known.prescription(x)[None], aim.entrance)[0]
         slope = aim.slopes[0]
@@ -65,7 +65,7 @@ def test_the_cost_is_the_error_of_drawn_pictures(direction, blades):
 
 @pytest.mark.parametrize("blades", [0, 6])
 def test_derivatives_are_those_of_differences(blades):
-    picture = canvas(TARGETS, SPANS, [(0.6, 0.8)], light=0.3, half_frame=(HALF, 0.7 * HALF), blades=blades)
+    picture = canvas(TARGETS, SPANS, [(0.6, 0.8)], light=0.3, half_frame=(HALF, 0.7 * HALF), blades=blades).shown
     random = np.random.default_rng(3)
     shapes = np.array([0.0, 1.0, 0.0, kernel.ROUND, 0.0]) if blades else np.full(5, kernel.ROUND)
     places, sizes = TARGETS[:, 0] + random.normal(size=5), np.abs(TARGETS[:, 1]) * random.uniform(0.7, 1.3, 5)
@@ -172,7 +172,7 @@ def test_hidden_targets_are_not_drawn():
     others = canvas(
         np.delete(TARGETS, 2, axis=0), np.array([0, 4]), [(1.0, 0.0)], light=0.6, half_frame=(HALF, HALF), blades=6
     )
-    assert np.array_equal(picture.wanted, others.wanted)
+    assert np.array_equal(picture.shown.wanted, others.shown.wanted)
 
 
 @pytest.mark.parametrize(
@@ -192,7 +192,7 @@ def test_several_lights_have_pictures_of_their_own():
     design = Design(judge="picture", signed=False)
     lights = (Light(field_deg=(4.0, 0.0)), Light(field_deg=(0.0, -8.0)))
     problem, _ = problem_of(Project(lens="heliar-tronnier", lights=lights, design=design))
-    assert problem.objective.picture.wanted.shape[0] == 2
+    assert problem.objective.picture.shown.wanted.shape[0] == 2
     # the lens' own ghosts are its targets, so the pictures match
     kept = design.replace(fixed_rows=(0,), structure="lens")
     plain, _ = problem_of(Project(lens="heliar-tronnier", lights=lights, design=kept))

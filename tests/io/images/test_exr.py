@@ -7,7 +7,7 @@ import OpenEXR
 import pytest
 
 from flarewright.errors import FileError, FlarewrightError, OutputError
-from flarewright.io.images.exr import CHROMATICITIES, read_exr, read_exr_colour, read_exr_plane, write_exr
+from flarewright.io.images.exr import CHROMATICITIES, read_exr, read_exr_layer, read_exr_plane, write_exr
 from flarewright.io.images.half import rounded_to_half
 from flarewright.model import Layer
 
@@ -171,7 +171,7 @@ def test_a_picture_of_ours_is_read_in_its_own_units_as_a_plate_too(tmp_path):
     for kind, error in (("half", 2.0**-25 / 1024.0), ("float", 0.0)):
         write_exr(tmp_path / "a.exr", [dark], SIZE, pixel_type=kind)
         tolerance = {"rtol": 2.0**-11 if error else 0.0, "atol": error}
-        np.testing.assert_allclose(read_exr_colour(tmp_path / "a.exr"), dark.pixels, **tolerance)
+        np.testing.assert_allclose(read_exr_layer(tmp_path / "a.exr", None)[0], dark.pixels, **tolerance)
         for k, channel in enumerate("RGB"):
             plane = read_exr_plane(tmp_path / "a.exr", ((channel,),))
             np.testing.assert_allclose(plane, dark.pixels[..., k], **tolerance)
@@ -203,7 +203,7 @@ def test_a_damaged_scale_is_one_sentence(tmp_path, scale):
     with pytest.raises(OutputError, match=words):
         read_exr(tmp_path / "a.exr")
     with pytest.raises(FileError, match=words):
-        read_exr_colour(tmp_path / "a.exr")
+        read_exr_layer(tmp_path / "a.exr", None)
     with pytest.raises(FileError, match=words):
         read_exr_plane(tmp_path / "a.exr", (("R",),))
 

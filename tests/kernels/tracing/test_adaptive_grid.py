@@ -15,7 +15,7 @@ from flarewright.optics.lens.paths import LightPath, ghost_path, ghost_paths
 from flarewright.optics.pupil.iris import blade_edges
 from flarewright.optics.rays.bundle import Refinement, trace_grid, trace_points
 from flarewright.optics.rays.pupil_region import find_region, front_box, tracing_arguments
-from flarewright.render.ghosts.traced_ghosts import draw_final, find_entry, find_final
+from flarewright.render.ghosts.traced_ghosts import draw_final, find_final
 from flarewright.render.image.canvas import blank, merge
 from flarewright.render.scene.art_rules import PLAIN
 from flarewright.render.scene.opening import make_opening
@@ -194,7 +194,9 @@ def dense_flux(shot: Shot, path: LightPath, w: int, n: int) -> tuple[float, floa
     for c in range(path.stop_crossings):
         passing &= np.hypot(data[:, 5 + 2 * c], data[:, 6 + 2 * c]) <= shot.opening.radius
     weight = np.where(passing, data[:, 2], 0.0) * hx * hy * 2.0 * shot.incidence.cosine
-    entry = None if path.entry is None else find_entry(shot, path.entry)
+    entry = (
+        None if path.entry is None else find_region(shot.packed, path.entry, shot.incidence.tilt, shot.opening.radius)
+    )
     item = find_final(shot, path, PLAIN, entry)
     if item is None:
         return float(weight.sum()), 0.0

@@ -5,9 +5,9 @@ import pytest
 
 from flarewright import Camera, Layer, Light, Output, Project, Quality, shot
 from flarewright.cli.app import run
+from flarewright.colorimetry import PRIMARIES
 from flarewright.errors import ProjectError
 from flarewright.io.images.exr import CHROMATICITIES, read_exr
-from flarewright.io.images.file_space import PRIMARIES
 from flarewright.optics.colour.rgb import xyz_to_rgb_matrix
 from flarewright.render.image import ocio_space
 from flarewright.render.image.ocio_space import check_file_space, config_digest, in_file_space

@@ -83,8 +83,14 @@ def test_a_standard_coating_needs_no_keyword():
 
 
 def test_a_project_says_who_reads_texts():
-    with pytest.raises(ValueError, match=r"write coating=flarewright\.parse_coating_choice\('preset:staggered'\), or"):
-        fw.Project(lens="canon-28-80", lights=LIGHTS, coating="preset:staggered")
+    with pytest.raises(
+        fw.ProjectError, match=r"one of uncoated.*, or flarewright\.parse_coating_choice\('preset:nosuch'\)"
+    ):
+        fw.Project(coating="preset:nosuch")
+    with pytest.raises(
+        fw.ProjectError, match="'nosuch' is no standard coating; use one of uncoated-1930s, single-1950s"
+    ):
+        fw.Standard("nosuch")
 
 
 @pytest.mark.parametrize(
@@ -117,4 +123,4 @@ def test_the_signature_names_all_settings():
     named = inspect.signature(fw.render).parameters
     assert set(Settings.__annotations__) == set(fw.Project.model_fields) - {"lens", "schema_version"}
     assert [*named] == ["project", "threads", "progress", "run", "ledger", "profile", "kept", *Settings.__annotations__]
-    assert "coating: 'str | " in str(inspect.signature(fw.render))
+    assert "timeline: 'Timeline' = <as in the project>, " in str(inspect.signature(fw.render))

@@ -69,9 +69,7 @@ def _mirrors(ghost: str) -> tuple[int, int]:
 
 
 def move_stop(
-    lens: Lens,
-    output: Output,
-    row: Annotated[int, typer.Option(help="Row that becomes the stop, a plane in air.")],
+    lens: Lens, output: Output, row: Annotated[int, typer.Option(help="Row that becomes the stop, a plane in air.")]
 ) -> None:
     """Make another row the stop; the old stop is removed."""
     check_place(output, ".toml")

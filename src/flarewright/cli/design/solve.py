@@ -195,6 +195,7 @@ def search(
         Facts for JSON.
     """
     from ...design.results.report import search_summary, write_checkpoint, write_folder
+    from ...io.files.atomic_write import make_folder
     from ...workflow.lens_search import search_lenses
 
     latest, stored = state, state
@@ -207,10 +208,7 @@ def search(
 
     def observer(unit: str) -> Callable[[PoolState], None]:
         # the project is valid by now, and the search starts
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"cannot make the folder {folder}: {(error.strerror or str(error)).lower()}") from None
+        make_folder(folder)
         show = watching.enter_context(_progress_display(unit))
         watching.enter_context(checkpoints(store))
 

@@ -11,9 +11,7 @@ from ..common import print_remarks
 EPILOG = "The files that were added stay where they are: flarewright library add adds them again."
 
 
-def remove(
-    names: Annotated[list[str], typer.Argument(metavar="NAME...", help="Lenses of your library.")],
-) -> None:
+def remove(names: Annotated[list[str], typer.Argument(metavar="NAME...", help="Lenses of your library.")]) -> None:
     """Remove lenses from your library."""
     from ...workflow.own_library.own_lenses import find_own, remove_lens
 

@@ -19,8 +19,7 @@ def report(
         Path | None, typer.Option("-o", "--output", metavar="OUT.html", help="The page (default: DIR/report.html).")
     ] = None,
     model: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="A ghost model (default: DIR/compact.json or DIR/model.json)."),
+        Path | None, typer.Option(metavar="FILE", help="A ghost model (default: DIR/compact.json or DIR/model.json).")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:

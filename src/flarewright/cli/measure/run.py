@@ -49,8 +49,7 @@ Threads = Annotated[
     int | None, typer.Option(min=1, help="Number of threads, without effect on the pixels (default: all cores).")
 ]
 Cluster = Annotated[
-    str | None,
-    typer.Option(metavar="WHERE", help="Merge on a Dask cluster: local:N, tcp://HOST:PORT or slurm:FILE."),
+    str | None, typer.Option(metavar="WHERE", help="Merge on a Dask cluster: local:N, tcp://HOST:PORT or slurm:FILE.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 

@@ -85,11 +85,7 @@ def track(folder: Folder, every: Every = 1, threads: TrackThreads = None, as_jso
 
 
 def compress(
-    folder: Folder,
-    every: Every = 1,
-    no_residual: NoResidual = False,
-    threads: Threads = None,
-    as_json: Json = False,
+    folder: Folder, every: Every = 1, no_residual: NoResidual = False, threads: Threads = None, as_json: Json = False
 ) -> None:
     """Remove parts of DIR/model.json without predictive value, add the tracks, and write DIR/compact.json."""
     _one("compress", folder, every, None, threads, as_json, residual=not no_residual)

@@ -128,12 +128,11 @@ def _camera_number(scene: Scene, name: str) -> int:
 def _refuse_dark(path: Path, scene: Scene) -> None:
     """Raise an error for lights without visible light, before anything is rendered."""
     from ...io.files.sentences import summary
-    from ...io.project.project_file import ProjectFileError
     from ...workflow.scene_check import light_errors
 
     problems = light_errors(scene)
     if problems:
-        raise ProjectFileError(summary(str(path), problems), tuple(problems))
+        raise ProjectError(summary(str(path), problems), tuple(problems))
 
 
 def _named(camera: Any, light: Any, diameter_deg: float, distance_m: float | None, **how: Any) -> Any:

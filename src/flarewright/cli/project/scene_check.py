@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ...errors import naming
+from ...errors import ProjectError, naming
 from ..common import errors_as_json, print_json
 
 
@@ -17,7 +17,6 @@ def check(
 ) -> None:
     """Check a scene, and list all errors; exit code 2 if it cannot be used."""
     from ...io.files.sentences import count, summary
-    from ...io.project.project_file import ProjectFileError
     from ...io.project.scene_file import read_scene
     from ...predict.tracks import camera_track, moments, sightings
     from ...workflow.scene_check import camera_errors, light_errors
@@ -28,7 +27,7 @@ def check(
         tracks = [camera_track(one, times, f"cameras[{c}] ({one.name})") for c, one in enumerate(scene.cameras)]
         problems = light_errors(scene) + camera_errors(file, scene, sightings(scene, tracks, times, dates))
         if problems:
-            raise ProjectFileError(summary(str(file), problems), tuple(problems))
+            raise ProjectError(summary(str(file), problems), tuple(problems))
     if as_json:
         facts = {"cameras": len(scene.cameras), "lights": len(scene.lights), "times": len(times)}
         print_json({"file": str(file), "usable": True, "scene": scene.name, **facts})

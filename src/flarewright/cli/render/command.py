@@ -129,22 +129,21 @@ def project_of_options(
     from .tracks import given_tracks, placed, with_given_tracks, with_lights
 
     _check_places(options, timeline)
-    base = None if state is None else state.project
-    if options.track and options.project is not None:
-        # `build_project` reads it again, with the flags; only tracks need its lights and its start before
-        base = read_project(options.project)
+    base = options.base
+    if options.project is not None:
+        base = base or read_project(options.project)
+    elif state is not None:
+        base = state.project
     start = (timeline or {}).get("start", 1 if base is None else base.timeline.start)
     tracked = given_tracks(options, start)
-    flags = replace(options, resumed=None if state is None else state.project, tracked=tracked)
+    flags = replace(options, base=base, tracked=tracked)
     given, plain = settings_of(flags), options.ideal or options.project is not None or state is not None
     remarks: list[str] = []
     if options.look is not None:
         flags, of_look, unfit = put_look(flags, options.look)
         given, remarks = given | of_look, list(unfit)
     if flags.tracked:
-        # a look has put the lights of the project, or its own, into `resumed`
-        lit = base if flags.resumed is None else flags.resumed
-        known = known_lights(flags, () if lit is None else lit.lights)
+        known = known_lights(flags, () if flags.base is None else flags.base.lights)
         flags = replace(flags, tracked=with_lights(flags.tracked, [light.get("name", "light") for light in known]))
     settings = build_project(flags)
     if not plain:

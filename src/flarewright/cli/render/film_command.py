@@ -32,11 +32,7 @@ def film(
     ] = None,
     layer: Annotated[str | None, typer.Option(metavar="NAME", help="Layer of EXR files (default: the sum).")] = None,
     view: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="filmic (default for a flare), srgb, rec709 or aces.",
-        ),
+        str | None, typer.Option(metavar="NAME", help="filmic (default for a flare), srgb, rec709 or aces.")
     ] = None,
     exposure: Annotated[
         float | None,

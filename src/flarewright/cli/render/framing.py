@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from ...model import Project
     from .options.record import RenderOptions
 
-__all__ = ["framed", "on_sensor"]
-
 # width of a picture of film, which has no pixels
 _FILM_WIDTH_PX = 1280
 _PART = re.compile(r"^\s*(\d+(?:\.\d+)?)\s*(%|px)?\s*$")
@@ -57,7 +55,7 @@ def framed(project: Project, flags: RenderOptions) -> tuple[Project, tuple[int, 
     sensor = project.camera.replace(squeeze=squeeze).sensor if project.camera.desqueeze else project.camera.sensor
     remarks: list[str] = []
     if named:
-        fixed = flags.size is not None or flags.project is not None or flags.resumed is not None
+        fixed = flags.size is not None or flags.project is not None
         size, sensor, words = on_sensor(camera_format(flags.sensor or ""), size if fixed else None, squeeze)
         remarks.append(words)
     counted = size if flags.crop is None else _cropped(size, flags.crop)

@@ -12,16 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ...errors import ProjectError
-from ..common import (
-    chosen_fstop,
-    console,
-    field_angles,
-    first_run_bar,
-    pair,
-    picture_size,
-    print_json,
-    print_remarks,
-)
+from ..common import chosen_fstop, console, field_angles, first_run_bar, pair, picture_size, print_json, print_remarks
 from ..option_record import with_options
 
 if TYPE_CHECKING:
@@ -85,8 +76,7 @@ class GhostsOptions:
     ] = None
     sensor_reflectance: Annotated[float, typer.Option(help="Reflectance of the sensor, 0 to 1 (default: 0).")] = 0.0
     imperfection: Annotated[
-        str | None,
-        typer.Option(metavar="SEED[:UM:ARCMIN[:NM]]", help="Random sample of the lens within tolerances."),
+        str | None, typer.Option(metavar="SEED[:UM:ARCMIN[:NM]]", help="Random sample of the lens within tolerances.")
     ] = None
     orders: Annotated[int, typer.Option(help="Reflections: 4 also lists ghosts of four (default: 2).")] = 2
     order4_limit: Annotated[

@@ -7,14 +7,11 @@ from dataclasses import replace
 from ...errors import ProjectError
 from ...io.measurement.ghost_model_file import is_ghost_model_file
 from ...io.project.look_file import read_look
-from ...io.project.project_file import read_project
 from ...model import Light, Project
 from ...render.scene.looks import look_keys, with_look
 from ...render.scene.photographic_defaults import as_photographed
 from .options.record import RenderOptions
 from .project_flags import flag_lights
-
-__all__ = ["put_look", "settings_of"]
 
 
 def put_look(flags: RenderOptions, name: str) -> tuple[RenderOptions, frozenset[str], tuple[str, ...]]:
@@ -29,7 +26,7 @@ def put_look(flags: RenderOptions, name: str) -> tuple[RenderOptions, frozenset[
     Returns
     -------
     flags : RenderOptions
-        Their lens, lights and project file are in `resumed`, a project with the look.
+        Their lens, lights and project file are in `base`, a project with the look.
     given : frozenset of str
         Settings of the look, for `as_photographed`.
     remarks : tuple of str
@@ -39,10 +36,10 @@ def put_look(flags: RenderOptions, name: str) -> tuple[RenderOptions, frozenset[
     FlarewrightError
         When there is no such look, or the lens or the project cannot be read.
     """
-    if flags.resumed is not None:
+    if flags.resume is not None:
         raise ProjectError("--resume continues a picture with its settings; omit --look")
     look = read_look(name)
-    base = None if flags.project is None else read_project(flags.project)
+    base = flags.base
     stage = base or look.example
     lens = stage.lens if flags.lens is None else flags.lens
     if isinstance(lens, str) and is_ghost_model_file(lens):
@@ -55,7 +52,7 @@ def put_look(flags: RenderOptions, name: str) -> tuple[RenderOptions, frozenset[
         shot = base.replace(lens=lens, lights=lights)
     found, remarks = with_look(shot, look)
     return (
-        replace(flags, lens=None, light=[], light_px=[], sun=None, project=None, resumed=found),
+        replace(flags, lens=None, light=[], light_px=[], sun=None, project=None, base=found),
         look_keys(look),
         remarks,
     )

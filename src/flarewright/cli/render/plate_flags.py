@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from ...model import Backplate
     from ...plates.settings import PlateSettings
 
-__all__ = ["plate_settings"]
-
 # options that change nothing without a plate
 _FLAGS = tuple(each.name for kind in (PlateOptions, CompOptions) for each in fields(kind))
 

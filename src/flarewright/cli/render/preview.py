@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from ...model import Project
     from ...render.render import Rendering
 
-__all__ = ["PreviewLook", "check_exposure", "preview_look", "write_preview"]
-
 
 @dataclass(frozen=True)
 class PreviewLook:

@@ -12,7 +12,7 @@ from ...errors import ProjectError
 from ...io.lens.coating_text import parse_coating_choice
 from ...io.lens.plate_text import parse_grating, parse_imperfection, parse_plate
 from ...io.project.camera_list import is_camera_name
-from ...io.project.project_file import ProjectFileError, read_project, validation_messages
+from ...io.project.project_file import validation_messages
 from ...io.project.spectrum_text import parse_spectrum
 from ...model import Art, Holdout, Iris, Lens, Light, Project, ProjectCurve, Scatter
 from ...model.project.camera import Colorspace
@@ -79,7 +79,7 @@ _SCATTER_USES: dict[str, tuple[str, ...]] = {"none": (), "chaumond": (), "abg": 
 
 
 def build_project(flags: RenderOptions) -> Project:
-    """Return the project of the flags, based on the project file or on a resumed render if there is one.
+    """Return the project of the flags, based on that of the project file, of a resumed render or of a look.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def build_project(flags: RenderOptions) -> Project:
         When a flag is invalid or something is missing; the error lists all findings.
     """
     _check_together(flags)
-    base = read_project(flags.project) if flags.project is not None else flags.resumed
+    base = flags.base
     if base is None and flags.lens is None:
         raise ProjectError("no lens is given; name one (flarewright lenses lists them) or give a --project file")
     if base is None and not (flags.light or flags.light_px or flags.sun or flags.tracked):
@@ -118,10 +118,7 @@ def build_project(flags: RenderOptions) -> Project:
     if flags.ghost_offset is not None:
         # on its own it shifts ghosts only: the lens is as designed
         nothing = {"seed": flags.seed or 0, "decentre_um": 0.0, "tilt_arcmin": 0.0}
-        fields["imperfection"] = {
-            **dict(fields.get("imperfection") or nothing),
-            "ghost_offset_mm": flags.ghost_offset,
-        }
+        fields["imperfection"] = {**dict(fields.get("imperfection") or nothing), "ghost_offset_mm": flags.ghost_offset}
     if (iris := _iris(flags, fields["lens"], base)) is not None:
         fields["iris"] = iris
     for section, changes in _sections(flags).items():
@@ -189,7 +186,7 @@ def project_of(fields: dict[str, Any]) -> Project:
         if len(findings) == 1:
             raise ProjectError(findings[0]) from None
         message = f"{len(findings)} settings cannot be used, the first: {findings[0]}"
-        raise ProjectFileError(message, tuple(findings)) from None
+        raise ProjectError(message, tuple(findings)) from None
 
 
 def _check_together(flags: RenderOptions) -> None:

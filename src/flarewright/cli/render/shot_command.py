@@ -20,7 +20,7 @@ from .options.record import RenderOptions
 from .options.shot import ShotOptions
 
 if TYPE_CHECKING:
-    from ...model import Backplate, Project
+    from ...model import Project
     from ...plates.settings import PlateSettings
     from ...workflow.plates.plate_sources import PlateShot
     from ...workflow.shot_frame import FrameResult
@@ -42,12 +42,15 @@ def shot(options: ShotOptions) -> None:
     Finished frames are kept: the same command resumes, and a changed project draws only the frames that it changes.
     On a terminal a bar shows the progress; elsewhere stderr gets one line of JSON for each frame.
     """
+    from ...io.project.project_file import read_project
     from ...workflow.shot import shot as draw
     from .plate_flags import plate_settings
 
     parts = _parts(options.parts)
     _check_movie(options)
-    plate = plate_settings(options.plate, options, _own_plate(options))
+    if options.project is not None:
+        options = replace(options, base=read_project(options.project))
+    plate = plate_settings(options.plate, options, None if options.base is None else options.base.plate)
     project, remarks = _project(options, plate)
     _keep_inputs(options, project, plate)
     started = time.monotonic()
@@ -117,15 +120,6 @@ def _check_movie(options: ShotOptions) -> None:
         if value is not None and options.movie is None:
             raise ProjectError(f"{flag} is for the film, and none is made; add --movie FILM.mp4, or omit {flag}")
     check_look(options.view, options.exposure)
-
-
-def _own_plate(options: ShotOptions) -> Backplate | None:
-    """Return the plate that a project file names."""
-    if options.project is None or (options.plate is None and options.over is None):
-        return None
-    from ...io.project.project_file import read_project
-
-    return read_project(options.project).plate
 
 
 def _parts(text: str | None) -> Literal["multi", "single"]:

@@ -40,8 +40,7 @@ class SourcesInput:
         str | None, typer.Option(metavar="A-BxS", help="1001-1240, 1001-1240x2 or 1,5,9-12 (default: all files).")
     ] = None
     marked: Annotated[
-        str | None,
-        typer.Option(metavar="NAME.####.png", help="Write the plate with an outline for each light."),
+        str | None, typer.Option(metavar="NAME.####.png", help="Write the plate with an outline for each light.")
     ] = None
     table: Annotated[
         Path | None, typer.Option("--csv", metavar="FILE", help="Write a line for each light and frame.")

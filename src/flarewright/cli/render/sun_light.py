@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from ...workflow.sun_place import SunPlace
     from .options.record import RenderOptions
 
-__all__ = ["check_aim", "sun_field", "sun_remark"]
-
 _FORM = "--sun 2024-06-21T18:00+02:00,48.14,11.58 (time with its offset from UTC, degrees north, degrees east)"
 # ranges of heading, tilt and roll, degrees
 _RANGES = {"--heading": (-360.0, 360.0), "--tilt": (-90.0, 90.0), "--roll": (-360.0, 360.0)}

@@ -16,11 +16,6 @@ if TYPE_CHECKING:
     from ...model import Project
     from .options.record import RenderOptions
 
-__all__ = [
-    "GivenTrack", "from_top_left", "given_tracks", "pixel_place", "placed", "px_origin", "track_files",
-    "with_given_tracks", "with_lights", "with_new_lights",
-]  # fmt: skip
-
 
 @dataclass(frozen=True, eq=False)
 class GivenTrack:
@@ -50,11 +45,11 @@ def px_origin(text: str | None) -> Origin | None:
     raise ProjectError(f"--px-origin {text!r} is unknown; choose top-left or bottom-left")
 
 
-def pixel_place(text: str, flag: str = "--light-px") -> tuple[float, float]:
+def pixel_place(text: str) -> tuple[float, float]:
     """Return the pixels of a text X,Y or sun@X,Y."""
-    x, y = pair(text.rpartition("@")[2], flag, "640,360 (pixels)")
+    x, y = pair(text.rpartition("@")[2], "--light-px", "640,360 (pixels)")
     if max(abs(x), abs(y)) > 1e7:
-        raise ProjectError(f"{flag} {text!r} lies beyond every picture; write {flag} 640,360 (pixels)")
+        raise ProjectError(f"--light-px {text!r} lies beyond every picture; write --light-px 640,360 (pixels)")
     return x, y
 
 

@@ -300,8 +300,7 @@ def coated(lens: Lens, coated_rows: Indices, kind: Kind, values: Floats) -> Lens
     rows = list(lens.rows)
     for k, value in zip(coated_rows, values, strict=True):
         rows[k] = rows[k].replace(coating=coating_of(kind, value))
-    out: Lens = lens.replace(rows=tuple(rows))
-    return out
+    return lens.replace(rows=tuple(rows))
 
 
 def coating_of(kind: Kind, values: Floats) -> Coating:

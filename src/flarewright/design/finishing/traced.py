@@ -47,11 +47,7 @@ class _Case:
 
 
 def traced_ghosts(
-    structure: Structure,
-    vector: Floats,
-    slope: float,
-    entrance: float,
-    pairs: Sequence[tuple[int, int]] | None = None,
+    structure: Structure, vector: Floats, slope: float, entrance: float, pairs: Sequence[tuple[int, int]] | None = None
 ) -> Floats:
     """Trace the ghosts of a prescription.
 

@@ -101,8 +101,7 @@ def on_the_line(ghost_target: GhostTarget, number: int, project: Project) -> Gho
     if ghost_target.light is None and len(project.lights) > 1:
         raise ProjectError(f"design.ghost_targets[{number}]: at_mm holds for one light; name it, e.g. light = 0")
     along, _ = _along_and_aside(ghost_target, project)
-    changed: GhostTarget = ghost_target.replace(at_mm=None, place_mm=along)
-    return changed
+    return ghost_target.replace(at_mm=None, place_mm=along)
 
 
 def _along_and_aside(ghost_target: GhostTarget, project: Project) -> tuple[float, float]:

@@ -35,4 +35,4 @@ def opened_to(lens: Lens, stop_diameter: float) -> Lens:
             f"{lens.name}: a stop of {stop_diameter:.4g} mm makes this lens f/{f_number:.4g}, and f-numbers go from "
             f"{LEAST_F_NUMBER:g} to {LARGEST_F_NUMBER:g}; change less, or open the stop"
         )
-    return lens.replace(f_number=f_number)  # type: ignore[no-any-return]
+    return lens.replace(f_number=f_number)

@@ -56,7 +56,7 @@ def problem_of(project: Project) -> tuple[Problem, ResolvedProject]:
         structure, vector, slopes, bounds=design.bounds, signed=design.signed, brightness=design.brightness,
         weights=design.weights, extra=design.extra, entrance=design.entrance,
     )  # fmt: skip
-    objective = with_ghost_targets(own, design, structure)
+    objective = _with_ghost_targets(own, design, structure)
     if len(objective.targets) == 0 or objective.wanted == 0:
         raise ProjectError("no ghost is a target; keep some of the lens' own ghosts, or add new targets")
     if design.judge == "picture":
@@ -124,25 +124,8 @@ def _checked(rows: tuple[int, ...], structure: Structure) -> tuple[int, ...]:
     return rows
 
 
-def with_ghost_targets(own: Objective, design: Design, structure: Structure) -> Objective:
-    """Apply ghost targets to the objective made of a lens' own ghosts.
-
-    Parameters
-    ----------
-    own : Objective
-    design : Design
-    structure : Structure
-        Of the lens.
-
-    Returns
-    -------
-    Objective
-
-    Raises
-    ------
-    ProjectError
-        When a target names a ghost or a light that does not exist.
-    """
+def _with_ghost_targets(own: Objective, design: Design, structure: Structure) -> Objective:
+    """Return the objective made of a lens' own ghosts with ghost targets applied; they may name what does not exist."""
     names = {f"{j}-{i}" for j, i in structure.pairs}
     lights = len(own.slopes)
     for number, ghost_target in enumerate(design.ghost_targets):

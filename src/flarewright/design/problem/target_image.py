@@ -25,37 +25,14 @@ class TargetCanvas:
 
     Attributes
     ----------
-    light : float
-        Level of a ghost times its radius, mm.
-    unit : float
-        One over the mean square of the target pictures, so that black pictures cost 1.
-    edges : ndarray, shape (L, 2, E, 2)
-    rows : ndarray, shape (V, 2)
-    limits : ndarray, shape (L, V, 2)
-    start, pixel : float
-        mm.
-    wanted : ndarray, shape (L, V, U)
-        As in `kernels.design.arguments.TargetPicture`.
+    shown : TargetPicture
+        Its `unit` is one over the mean square of the target pictures, so that black pictures cost 1.
     fine : TargetCanvas or None
         The same at a higher resolution.
     """
 
-    light: float
-    unit: float
-    edges: Floats
-    rows: Floats
-    limits: Floats
-    start: float
-    pixel: float
-    wanted: Floats
+    shown: TargetPicture
     fine: TargetCanvas | None = None
-
-    @property
-    def for_kernels(self) -> TargetPicture:
-        """The pictures as the search takes them."""
-        return TargetPicture(
-            self.light, self.unit, self.edges, self.rows, self.limits, self.start, self.pixel, self.wanted
-        )
 
 
 def canvas(
@@ -124,7 +101,7 @@ def _canvas(
         shown = np.stack([here[:, 0], sizes, levels, shapes], axis=1)
         draw_picture(shown, edges[number], table, limits[number], start, pixel, wanted[number])
     error = float((table[:, AREA, None] * wanted**2).sum())
-    return TargetCanvas(light, 1.0 / max(error, 1e-12), edges, table, limits, start, pixel, wanted)
+    return TargetCanvas(TargetPicture(light, 1.0 / max(error, 1e-12), edges, table, limits, start, pixel, wanted))
 
 
 def _edges(direction: tuple[float, float], blades: int) -> Floats:

@@ -197,8 +197,7 @@ def _color_project(project: Project, problem: Problem, one: Outcome, path: Path)
     if not found or project.design is None:
         return None
     design = Design(ghost_targets=tuple(found.values()), bounds=project.design.bounds)
-    changed: Project = project.replace(lens=os.fspath(path), design=design, coating=AsLens(), f_number=None, zoom=None)
-    return changed
+    return project.replace(lens=os.fspath(path), design=design, coating=AsLens(), f_number=None, zoom=None)
 
 
 def target_pictures(problem: Problem, project: Project) -> list[Floats]:

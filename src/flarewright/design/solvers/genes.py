@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import ProjectError
 from ...kernels.design import fitness as kernel
 from ...kernels.design.arguments import GeneCode
-from ...typing import Floats, Indices
+from ...typing import Floats
 from ..problem.prescription import Structure
 from ..problem.problem import LensCandidate, Problem
 
@@ -29,48 +29,34 @@ class Genes:
     measure : {"ours", "algorithm1"}
         The cost of the built-in solver, at the best matching, or Algorithm 1 of Van Acoleyen 2025 with the problem's
         limits.
-    stops : ndarray, shape (S,), int64
-        Rows where the stop may stand.
-    pattern : ndarray, shape (K,), int64
-        1 glass, 0 air, -1 chosen by the genes.
-    places : ndarray, shape (D,), int64
-        Meaning of each gene: 0 the stop, 1 + v search variable v.
-    low, high : ndarray, shape (2, 1 + 3 K)
-        Bounds where a row's gap is air, and where it is glass.
+    code : GeneCode
+        How they are decoded.
     """
 
     problem: Problem
     measure: Measure
-    stops: Indices
-    pattern: Indices
-    places: Indices
-    low: Floats
-    high: Floats
+    code: GeneCode
 
     @property
     def count(self) -> int:
         """Number of genes, the size of the decision vector in the thesis."""
-        return len(self.places)
-
-    @property
-    def _code(self) -> GeneCode:
-        return GeneCode(self.stops, self.pattern, self.places, self.low, self.high)
+        return len(self.code.places)
 
     def fitness(self, genes: Floats) -> Floats:
         """Compute the fitness of many points, shape (B, D): shape (B,)."""
         aim, out = self.problem.objective, np.empty(len(genes))
         kernel.fitness_of_genes(
-            np.ascontiguousarray(genes), self._code, _KINDS[self.measure], aim.entrance, aim.for_kernels, aim.limits,
+            np.ascontiguousarray(genes), self.code, _KINDS[self.measure], aim.entrance, aim.for_kernels, aim.limits,
             out,
         )  # fmt: skip
         return out
 
     def candidates(self, genes: Floats, costs: Floats) -> tuple[LensCandidate, ...]:
         """Convert genes, shape (B, D), with their fitness to lenses inside the bounds."""
-        size = self.low.shape[1]
+        size = self.code.low.shape[1]
         xs, stops = np.empty((len(genes), size)), np.empty(len(genes), np.int64)
-        glass = np.empty((len(genes), len(self.pattern)), np.bool_)
-        kernel.decode_many(np.ascontiguousarray(genes), self._code, xs, stops, glass)
+        glass = np.empty((len(genes), len(self.code.pattern)), np.bool_)
+        kernel.decode_many(np.ascontiguousarray(genes), self.code, xs, stops, glass)
         return tuple(
             LensCandidate(float(cost), Structure(int(stop), tuple(bool(one) for one in gaps)), x)
             for cost, stop, gaps, x in zip(costs, stops, glass, xs, strict=True)
@@ -96,17 +82,18 @@ class Genes:
         x = self.problem.variables(structure).search_point(vector)
         glass = np.array(structure.glass)
         side = np.concatenate([[0], np.tile(glass.astype(int), 3)])
-        low, high = (np.take_along_axis(table, side[None], axis=0)[0] for table in (self.low, self.high))
+        low, high = (np.take_along_axis(table, side[None], axis=0)[0] for table in (self.code.low, self.code.high))
         span = np.where(high > low, high - low, 1.0)
         part = np.where(high > low, (x - low) / span, 0.5)
         bent = slice(1 + rows, 1 + 2 * rows)
         part[bent] = 0.5 + 0.5 * np.cbrt(2.0 * part[bent] - 1.0)
         index = slice(1 + 2 * rows, None)
-        free = self.pattern < 0
+        free = self.code.pattern < 0
         chosen = kernel.AIR_PART + (1.0 - kernel.AIR_PART) * part[index]
         part[index] = np.where(free, np.where(glass, chosen, 0.5 * kernel.AIR_PART), part[index])
-        where = (int(np.flatnonzero(self.stops == structure.stop)[0]) + 0.5) / len(self.stops)
-        return np.asarray(np.concatenate([[where], part])[self.places], dtype=np.float64)
+        stops = self.code.stops
+        where = (int(np.flatnonzero(stops == structure.stop)[0]) + 0.5) / len(stops)
+        return np.asarray(np.concatenate([[where], part])[self.code.places], dtype=np.float64)
 
 
 def genes_of(problem: Problem, measure: Measure = "ours") -> Genes:
@@ -148,7 +135,7 @@ def genes_of(problem: Problem, measure: Measure = "ours") -> Genes:
         moves[-1] = False
     elif first.stop < rows:
         moves[2 + rows + first.stop] = False
-    return Genes(problem, measure, stops, pattern, np.flatnonzero(moves).astype(np.int64), low, high)
+    return Genes(problem, measure, GeneCode(stops, pattern, np.flatnonzero(moves).astype(np.int64), low, high))
 
 
 def _as(first: Structure, glass: bool, stop: int, several: bool) -> Structure:

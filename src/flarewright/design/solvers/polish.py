@@ -86,9 +86,7 @@ def polish_within(
     lens = LensStructure(known.structure.stop, known.structure.mirrors, aim.entrance)
     space = FreeVariables(known.low, known.high, known.free, known.longest)
     if aim.picture is not None:
-        polish_by_picture(
-            points, lens, space, aim.slopes, aim.limits, aim.picture.for_kernels, steps, worth, ends, costs
-        )
+        polish_by_picture(points, lens, space, aim.slopes, aim.limits, aim.picture.shown, steps, worth, ends, costs)
         return ends, costs
     matches = np.empty((len(points), len(aim.targets)), np.int64)
     effort = Effort(steps, _PATIENCE, ENOUGH)

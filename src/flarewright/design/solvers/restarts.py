@@ -12,8 +12,6 @@ from .pool_search import KEPT, PoolState
 MOST_RESTARTS = 1000
 """Largest number of independent searches."""
 
-__all__ = ["MOST_RESTARTS", "merged", "restart_seed", "so_far"]
-
 
 def restart_seed(seed: int, number: int) -> int:
     """Return the seed of an independent search.

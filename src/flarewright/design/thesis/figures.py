@@ -106,18 +106,8 @@ def _median(runs: Sequence[Run], key: str) -> str:
     return number(float(np.median([getattr(run, key) for run in runs])))
 
 
-def fitness_charts(trial: Trial, runs: Sequence[Run]) -> tuple[Chart, ...]:
-    """Draw fitness against time: as in the thesis, and for lenses also the best matching.
-
-    Parameters
-    ----------
-    trial : Trial
-    runs : sequence of BenchmarkRun or ColorRun
-
-    Returns
-    -------
-    tuple of Chart
-    """
+def _fitness_charts(trial: Trial, runs: Sequence[Run]) -> tuple[Chart, ...]:
+    """Draw fitness against time: as in the thesis, and for lenses also the best matching."""
     drawn, sheets = curves(trial, runs), []
     for place, one in enumerate(one for one in trial.measures if one.along):
         figure = figures_shown(trial, solvers_of(runs))[0]
@@ -131,22 +121,8 @@ def fitness_charts(trial: Trial, runs: Sequence[Run]) -> tuple[Chart, ...]:
     return tuple(sheets)
 
 
-def picture_charts(trial: Trial, runs: Sequence[Run]) -> tuple[Chart, ...]:
-    """Draw PSNR, and for lenses SSIM, of each seed; a line marks the thesis' best.
-
-    Parameters
-    ----------
-    trial : Trial
-    runs : sequence of BenchmarkRun or ColorRun
-
-    Returns
-    -------
-    tuple of Chart
-    """
-    return tuple(_seeds_chart(trial, runs, one) for one in trial.measures if not one.along)
-
-
 def _seeds_chart(trial: Trial, runs: Sequence[Run], one: Measure) -> Chart:
+    """Draw PSNR or SSIM of each seed; a line marks the thesis' best."""
     dots, solvers = [], solvers_of(runs)
     for k, solver in enumerate(solvers):
         mine = [run for run in runs if run.solver == solver]
@@ -222,7 +198,8 @@ def write_figures(trial: Trial, runs: Sequence[Run], pictures: Sequence[tuple[st
     return html_page(
         "benchmark", title=f"Solvers compared: {trial.title}", trial=trial, thesis=reported[:1].upper() + reported[1:],
         about=figures_shown(trial, solvers_of(runs)), head=head(trial), rows=comparison(trial, runs), runs=runs,
-        fitness=fitness_charts(trial, runs), seeds=picture_charts(trial, runs),
+        fitness=_fitness_charts(trial, runs),
+        seeds=tuple(_seeds_chart(trial, runs, one) for one in trial.measures if not one.along),
         pictures=[(_shown(one), words) for words, one in pictures],
         every_head=("solver", "seed", "seconds", "evaluations", *titles),
         every=[(run.solver, run.seed, number(run.seconds), run.searches, *(number(getattr(run, key)) for key in keys))

@@ -108,8 +108,7 @@ def set_design(project: Project, values: dict[str, Any]) -> Project:
 
 def clear_ghost_targets(project: Project) -> Project:
     """Remove all targets."""
-    changed: Project = project.replace(design=None)
-    return changed
+    return project.replace(design=None)
 
 
 def ghost_target_names(design: Design) -> tuple[str, ...]:
@@ -129,8 +128,7 @@ def _with(project: Project, design: Design, ghost_targets: tuple[GhostTarget, ..
     if not _any_new(ghost_targets):
         # without new ghosts a search from scratch has no targets
         design = design.replace(own_ghosts=True)
-    changed: Project = project.replace(design=design.replace(ghost_targets=ghost_targets))
-    return changed
+    return project.replace(design=design.replace(ghost_targets=ghost_targets))
 
 
 def target_project(project: Project) -> Project:
@@ -170,8 +168,7 @@ def target_project(project: Project) -> Project:
                 gain=ghost_target.brightness, tint=tint, offset_mm=(move * x, move * y) if move else None,
             )
         )  # fmt: skip
-    changed: Project = bare.replace(art=bare.art.replace(rules=tuple(rules)), design=None)
-    return changed
+    return bare.replace(art=bare.art.replace(rules=tuple(rules)), design=None)
 
 
 def new_discs(project: Project) -> tuple[tuple[float, float, float], ...]:

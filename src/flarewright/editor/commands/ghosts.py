@@ -79,8 +79,7 @@ def set_solo(project: Project, names: list[str]) -> Project:
 
 def reset_art(project: Project) -> Project:
     """Remove all overrides."""
-    changed: Project = project.replace(art=Art())
-    return changed
+    return project.replace(art=Art())
 
 
 def _is_solo(rule: Rule) -> bool:
@@ -90,5 +89,4 @@ def _is_solo(rule: Rule) -> bool:
 
 
 def _with(project: Project, rules: tuple[Rule, ...]) -> Project:
-    changed: Project = project.replace(art=project.art.replace(rules=rules, physical=False))
-    return changed
+    return project.replace(art=project.art.replace(rules=rules, physical=False))

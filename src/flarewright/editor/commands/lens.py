@@ -40,8 +40,7 @@ def own_lens(project: Project) -> Lens:
         else row
         for row in lens.rows
     )
-    own: Lens = lens.replace(rows=rows)
-    return own
+    return lens.replace(rows=rows)
 
 
 def set_cell(project: Project, row: int, column: str, text: str) -> Project:
@@ -82,7 +81,7 @@ def set_cell(project: Project, row: int, column: str, text: str) -> Project:
     if column == "coating" and not isinstance(project.coating, AsLens):
         # the cell shows the row's effective coating, so that is what it changes
         return _recoated(project, lens, row, new)
-    return with_lens(project, lens.replace(rows=rows))
+    return project.replace(lens=lens.replace(rows=rows))
 
 
 def _recoated(project: Project, lens: Lens, row: int, new: Row) -> Project:
@@ -90,25 +89,19 @@ def _recoated(project: Project, lens: Lens, row: int, new: Row) -> Project:
 
     coats = list(resolve_coatings(lens, project.coating))
     coats[row] = new.coating if isinstance(new, Surface) else None
-    changed: Project = project.replace(coating=PerRow(coatings=tuple(coats)))
-    return changed
+    return project.replace(coating=PerRow(coatings=tuple(coats)))
 
 
 def _changed(old: Surface, row: int, column: str, words: str) -> Surface:
     if column == "radius":
-        return _replaced(old, curvature=_curvature(words, row))
+        return old.replace(curvature=_curvature(words, row))
     if column == "thickness":
-        return _replaced(old, thickness=_number(words, row, column))
+        return old.replace(thickness=_number(words, row, column))
     if column == "semi_diameter":
-        return _replaced(old, semi_diameter=None if not words else _number(words, row, column))
+        return old.replace(semi_diameter=None if not words else _number(words, row, column))
     if column == "coating":
-        return _replaced(old, coating=coating_from(words))
-    return _replaced(old, medium=_medium(old, row, column, words))
-
-
-def _replaced(old: Surface, **changes: Any) -> Surface:
-    new: Surface = old.replace(**changes)
-    return new
+        return old.replace(coating=coating_from(words))
+    return old.replace(medium=_medium(old, row, column, words))
 
 
 def _medium(old: Surface, row: int, column: str, words: str) -> Any:
@@ -249,7 +242,7 @@ def move_stop(project: Project, row: int) -> Project:
         return moved
     assert isinstance(moved.lens, Lens)
     try:
-        return with_lens(moved, moved.lens.replace(positions=positions))
+        return moved.replace(lens=moved.lens.replace(positions=positions))
     except ValueError as error:
         raise LensError(sentence(error)) from None
 
@@ -286,8 +279,7 @@ def _with_stop_at(position: Position, lens: Lens, target: int, behind: float) ->
                 f"the stop cannot go there: in zoom position {position.name!r} that gap is {-gaps[target - 1]:.2f} mm "
                 "too narrow; choose a row beside another gap of air"
             )
-    moved: Position = position.replace(gaps=tuple((k + (k >= target), gap) for k, gap in sorted(gaps.items())))
-    return moved
+    return position.replace(gaps=tuple((k + (k >= target), gap) for k, gap in sorted(gaps.items())))
 
 
 def _behind(first: int) -> Callable[[int], int]:
@@ -312,7 +304,7 @@ def _renumbered(project: Project, lens: Lens, rows: tuple[Row, ...], place: Call
     if isinstance(coating, PerRow):
         coating = PerRow(coatings=_moved(list(coating.coatings), place, len(rows)))
     base: Project = project.replace(coating=coating, art=_without_names(project.art))
-    return with_lens(base, changed)
+    return base.replace(lens=changed)
 
 
 def _moved(entries: list[Any], place: Callable[[int], int | None], count: int) -> tuple[Any, ...]:
@@ -327,16 +319,7 @@ def _moved(entries: list[Any], place: Callable[[int], int | None], count: int) -
 def _without_names(art: Art) -> Art:
     """Remove rules that name rows, as the rows have new numbers."""
     plain = tuple(rule for rule in art.rules if not any(c.isdigit() for c in rule.select.partition(":")[0]))
-    kept: Art = art.replace(
-        rules=tuple(rule for rule in plain if not rule.select.removeprefix("not ").startswith("row:"))
-    )
-    return kept
-
-
-def with_lens(project: Project, lens: Lens) -> Project:
-    """Return a project with another prescription; iris settings are unchanged."""
-    changed: Project = project.replace(lens=lens)
-    return changed
+    return art.replace(rules=tuple(rule for rule in plain if not rule.select.removeprefix("not ").startswith("row:")))
 
 
 def choose_lens(project: Project, lens: str | Lens) -> Project:
@@ -385,7 +368,7 @@ def _kept_angles(field_deg: tuple[float, float], zoom: float) -> tuple[float, ..
 
 def set_lens_facts(project: Project, values: dict[str, Any]) -> Project:
     """Change the lens' general data: name, f_number (wide open), field_deg, sensor_distance."""
-    return with_lens(project, own_lens(project).replace(**values))
+    return project.replace(lens=own_lens(project).replace(**values))
 
 
 def table_of(project: Project) -> str:

@@ -6,8 +6,6 @@ from ...errors import ProjectError
 from ...model import Light, LightKey, Project
 from ...workflow.keyframes import project_at
 
-__all__ = ["STEP_S", "clear_keys", "go_to", "move_key", "remove_key", "set_key"]
-
 # time step of keys: two times within half a step belong to the same key
 STEP_S = 0.01
 
@@ -19,8 +17,7 @@ def go_to(project: Project, at_s: float) -> Project:
         light.replace(field_deg=tuple(round(angle, 4) for angle in light.field_deg)) if light.keyframes else light
         for light in placed.lights
     )
-    shown: Project = placed.replace(lights=tuple(lights))
-    return shown
+    return placed.replace(lights=tuple(lights))
 
 
 def set_key(project: Project, light: int, at_s: float, field_deg: list[float] | None = None) -> Project:
@@ -71,5 +68,4 @@ def _key(project: Project, light: int, number: int) -> LightKey:
 def _with_keys(project: Project, light: int, keys: list[LightKey]) -> Project:
     lights = list(project.lights)
     lights[light] = lights[light].replace(keyframes=tuple(sorted(keys, key=lambda key: key.at_s)))
-    changed: Project = project.replace(lights=tuple(lights))
-    return changed
+    return project.replace(lights=tuple(lights))

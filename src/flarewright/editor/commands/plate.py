@@ -48,11 +48,9 @@ def set_plate(project: Project, values: dict[str, Any]) -> Project:
         lights = tuple(
             light.replace(intensity=light.intensity * ratio) if found_in_plate(light) else light for light in lights
         )
-    changed: Project = project.replace(plate=new, lights=lights)
-    return changed
+    return project.replace(plate=new, lights=lights)
 
 
 def remove_plate(project: Project) -> Project:
     """Remove the plate; lights that were found in it stay."""
-    changed: Project = project.replace(plate=None)
-    return changed
+    return project.replace(plate=None)

@@ -35,7 +35,7 @@ def set_light(project: Project, light: int, values: dict[str, Any]) -> Project:
     if changes.get("diameter_deg"):
         changes["shape"] = None
     lights[light] = lights[light].replace(**changes)
-    return _with(project, lights=tuple(lights))
+    return project.replace(lights=tuple(lights))
 
 
 def add_light(project: Project) -> Project:
@@ -46,24 +46,24 @@ def add_light(project: Project) -> Project:
     # in the unit of a plate, 1 may be a million times a lamp
     intensity = project.lights[-1].intensity if project.lit_by_plate else 1.0
     new = Light(name=name, field_deg=(-x, y), spectrum=BlackBody(temperature_k=3200.0), intensity=intensity)
-    return _with(project, lights=(*project.lights, new))
+    return project.replace(lights=(*project.lights, new))
 
 
 def remove_light(project: Project, light: int) -> Project:
     """Remove a light; the last one cannot be removed."""
     if len(project.lights) == 1:
         raise ProjectError("a flare needs a light; move the last one instead")
-    return _with(project, lights=tuple(one for k, one in enumerate(project.lights) if k != light))
+    return project.replace(lights=tuple(one for k, one in enumerate(project.lights) if k != light))
 
 
 def set_camera(project: Project, values: dict[str, Any]) -> Project:
     """Change fields of the camera; if only the picture's width changes, the sensor keeps its shape."""
-    return _with(project, camera=project.camera.replace(**values))
+    return project.replace(camera=project.camera.replace(**values))
 
 
 def set_quality(project: Project, values: dict[str, Any]) -> Project:
     """Change fields of the quality."""
-    return _with(project, quality=project.quality.replace(**values))
+    return project.replace(quality=project.quality.replace(**values))
 
 
 def set_fields(project: Project, values: dict[str, Any]) -> Project:
@@ -72,12 +72,12 @@ def set_fields(project: Project, values: dict[str, Any]) -> Project:
     if unknown := set(values) - known:
         raise ProjectError(f"{', '.join(sorted(unknown))} cannot be set here; known are {', '.join(sorted(known))}")
     if is_measured(project):
-        changed = _with(project, **values)
+        changed = project.replace(**values)
         check_measured(changed, limit=True)
         return changed
     if (f_number := values.get("f_number")) is not None:
         values = {**values, "f_number": max(f_number, open_lens(project.lens).lens.f_number)}
-    changed = _with(project, **values)
+    changed = project.replace(**values)
     resolve_project(changed)
     return changed
 
@@ -94,7 +94,7 @@ def set_iris(project: Project, values: dict[str, Any]) -> Project:
     if changes.get("blades") in (1, 2):
         # the slider passes over blade counts that no iris has
         changes["blades"] = 3 if iris.blades < 3 else 0
-    return _with(project, iris=iris.replace(**changes))
+    return project.replace(iris=iris.replace(**changes))
 
 
 def set_holdout(project: Project, light: int | None, values: dict[str, Any] | None) -> Project:
@@ -123,17 +123,17 @@ def set_holdout(project: Project, light: int | None, values: dict[str, Any] | No
         elif changes.get("depth"):
             changes |= {"image": None, "invert": False}
         new = Holdout(**changes) if old is None else old.replace(**changes)
-    return _with(project, holdout=new) if light is None else set_light(project, light, {"holdout": new})
+    return project.replace(holdout=new) if light is None else set_light(project, light, {"holdout": new})
 
 
 def set_dirt(project: Project, values: dict[str, Any]) -> Project:
     """Change dust, scratches and other dirt."""
-    return _with(project, dirt=project.dirt.replace(**values))
+    return project.replace(dirt=project.dirt.replace(**values))
 
 
 def set_starburst(project: Project, values: dict[str, Any]) -> Project:
     """Change the starburst settings."""
-    return _with(project, starburst=project.starburst.replace(**values))
+    return project.replace(starburst=project.starburst.replace(**values))
 
 
 def set_pass_gain(project: Project, name: str, gain: float) -> Project:
@@ -141,12 +141,12 @@ def set_pass_gain(project: Project, name: str, gain: float) -> Project:
     gains = {key: value for key, value in project.art.gain.items() if key != name}
     if gain != 1.0:
         gains[name] = gain
-    return _with(project, art=project.art.replace(gain=gains))
+    return project.replace(art=project.art.replace(gain=gains))
 
 
 def set_coating(project: Project, text: str) -> Project:
     """Set the coating of the whole lens from a short text with the syntax of `--coating`."""
-    changed = _with(project, coating=parse_coating_choice(text))
+    changed = project.replace(coating=parse_coating_choice(text))
     resolve_project(changed)
     return changed
 
@@ -173,7 +173,7 @@ def set_row_wavelengths(project: Project, values: dict[str, float]) -> Project:
         if not 0 <= row < len(coats) or not isinstance(lens.rows[row], Surface):
             raise ProjectError(f"row {row} is no surface; nothing can be coated there")
         coats[row] = QuarterWave(center_wavelength_nm=float(wavelength_nm))
-    return _with(project, coating=PerRow(coatings=tuple(coats)))
+    return project.replace(coating=PerRow(coatings=tuple(coats)))
 
 
 def coating_text(project: Project) -> str:
@@ -184,8 +184,3 @@ def coating_text(project: Project) -> str:
     if isinstance(choice, Everywhere):
         return format_coating(choice.coating)
     return f"preset:{choice.name}" if choice.kind == "preset" else choice.kind
-
-
-def _with(project: Project, **changes: Any) -> Project:
-    changed: Project = project.replace(**changes)
-    return changed

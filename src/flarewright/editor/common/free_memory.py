@@ -14,8 +14,6 @@ from functools import cache
 MOST_FREE_BYTES = 128 * 2**20
 """Free memory that is kept for the next pictures."""
 
-__all__ = ["MOST_FREE_BYTES", "free_bytes", "release"]
-
 
 class _Mallinfo(ctypes.Structure):
     """The record `mallinfo2` of the GNU C library; sizes in bytes, of all arenas."""

@@ -9,7 +9,8 @@ from pathlib import Path
 from ... import __version__
 from ...design.solvers.pool_search import PoolState
 from ...design.solvers.search_state import read_state, write_state
-from ...errors import FlarewrightError, OutputError
+from ...errors import FlarewrightError
+from ...io.files.atomic_write import make_folder
 from ...io.files.state_folder import state_folder
 from ...model import Project
 
@@ -38,10 +39,7 @@ def keep(file: Path, state: PoolState) -> None:
     OutputError
         When it cannot be written.
     """
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot make the folder {file.parent}: {(error.strerror or str(error)).lower()}") from None
+    make_folder(file.parent)
     write_state(state, file)
     with suppress(OSError):
         known = sorted(file.parent.glob("*.json"), key=lambda one: one.stat().st_mtime_ns)

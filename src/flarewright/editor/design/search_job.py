@@ -78,8 +78,7 @@ class FoundLens:
 
     def taken(self, project: Project) -> Project:
         """Return a project with it and without targets, as these are met."""
-        found: Project = clear_ghost_targets(project).replace(**self.changes)
-        return found
+        return clear_ghost_targets(project).replace(**self.changes)
 
 
 @dataclass(frozen=True)

@@ -154,7 +154,7 @@ class Drag:
             else:
                 self._target_sheets = still.sheets
                 drawn = DrawnPicture(bare, "moving", still.ghosts, still.rest, 0.0)
-        return packed_target(self.screen, project, drawn, QUALITY)
+        return packed_target(self.screen, project, drawn)
 
     def prepare(self) -> None:
         """Draw the data that all pictures of a drag share, before it starts."""

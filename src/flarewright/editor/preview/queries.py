@@ -28,10 +28,10 @@ def target_jpeg(screen: Screen) -> bytes:
     # its ghosts are as bright as those of the picture beside it
     levels = levels_at(screen.match, project)
     drawn = render_picture.take(target_project(project), "draft", screen.session.view, room=screen.room, levels=levels)
-    return packed_target(screen, project, drawn, QUALITY)
+    return packed_target(screen, project, drawn)
 
 
-def packed_target(screen: Screen, project: Project, drawn: DrawnPicture, quality: int) -> bytes:
+def packed_target(screen: Screen, project: Project, drawn: DrawnPicture) -> bytes:
     """Encode a target picture with the view settings of the screen.
 
     Parameters
@@ -41,8 +41,6 @@ def packed_target(screen: Screen, project: Project, drawn: DrawnPicture, quality
         With its targets. New ghosts are uniform discs, a little brighter than their surroundings.
     drawn : DrawnPicture
         Picture of its `target_project`.
-    quality : int
-        Of the JPEG.
 
     Returns
     -------
@@ -60,7 +58,7 @@ def packed_target(screen: Screen, project: Project, drawn: DrawnPicture, quality
             right, down = columns + 0.5 - width / 2 - x * across, rows + 0.5 - height / 2 + y * across
             rest[np.hypot(right, down) < radius * across] += np.float32(level)
         drawn = replace(drawn, rest=rest)
-    return jpeg(pixels_of_picture(screen, drawn), quality)
+    return jpeg(pixels_of_picture(screen, drawn), QUALITY)
 
 
 def picked(screen: Screen, u: float, v: float) -> tuple[str, ...]:

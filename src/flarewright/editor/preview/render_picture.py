@@ -110,8 +110,7 @@ def staged(
     else:
         quality = Quality(mode="draft", wavelengths=DRAFT_WAVELENGTHS, paths=own.paths)
     output = Output(layers="passes", starburst=project.output.starburst)
-    found: Project = project.replace(camera=camera, quality=quality, output=output)
-    return found
+    return project.replace(camera=camera, quality=quality, output=output)
 
 
 def pointlike(project: Project) -> Project:
@@ -119,8 +118,7 @@ def pointlike(project: Project) -> Project:
     if sum(light.extended for light in project.lights) <= MOST_WIDE_LIGHTS:
         return project
     lights = tuple(light.replace(diameter_deg=0.0, shape=None) for light in project.lights)
-    found: Project = project.replace(lights=lights)
-    return found
+    return project.replace(lights=lights)
 
 
 def _slow_rings(project: Project) -> bool:
@@ -203,8 +201,7 @@ def take(
 def moving_stage(project: Project, scale: float, levels: Levels) -> Project:
     """Return the project for pictures of a drag."""
     stage = staged(project, "moving", scale)
-    found: Project = stage.replace(art=_levelled(stage.art, levels))
-    return found
+    return stage.replace(art=_levelled(stage.art, levels))
 
 
 def common_gain(shown: Project, project: Project) -> float | None:
@@ -246,8 +243,7 @@ def _levelled(art: Art, levels: Levels) -> Art:
         return art
     rules = tuple(Rule(select=",".join(names), gain=gain) for gain, names in levels)
     own = () if art.physical else art.rules
-    kept: Art = art.replace(physical=False, rules=(*own, *rules), gain={} if art.physical else art.gain)
-    return kept
+    return art.replace(physical=False, rules=(*own, *rules), gain={} if art.physical else art.gain)
 
 
 def exposure_of(picture: DrawnPicture, match: Match | None = None) -> float:
@@ -312,8 +308,7 @@ def pictured(project: Project) -> Project:
 
     Of a plate only whether the lights have its unit counts, which decides how the flare is exposed.
     """
-    found: Project = still(project).replace(design=None, plate=_ANY_LIT if project.lit_by_plate else None)
-    return found
+    return still(project).replace(design=None, plate=_ANY_LIT if project.lit_by_plate else None)
 
 
 def same_scene(one: Project, other: Project) -> bool:

@@ -153,24 +153,14 @@ def _do(workspace: Workspace, _request: Request, body: Any) -> Any:
     return workspace.state() | {"became": became}
 
 
-def _view(workspace: Workspace, _request: Request, body: Any) -> Any:
-    workspace.session.set_view(dict(body))
-    return workspace.state()
+def _then_state(act: Callable[[Workspace, Any], object]) -> Work:
+    """Return a handler that does something with the body and answers with the state."""
 
+    def work(workspace: Workspace, _request: Request, body: Any) -> Any:
+        act(workspace, body)
+        return workspace.state()
 
-def _undo(workspace: Workspace, _request: Request, _body: Any) -> Any:
-    workspace.session.undo()
-    return workspace.state()
-
-
-def _redo(workspace: Workspace, _request: Request, _body: Any) -> Any:
-    workspace.session.redo()
-    return workspace.state()
-
-
-def _expose(workspace: Workspace, _request: Request, _body: Any) -> Any:
-    workspace.screen.expose()
-    return workspace.state()
+    return work
 
 
 def _rest(workspace: Workspace, _request: Request, _body: Any) -> Any:
@@ -178,7 +168,7 @@ def _rest(workspace: Workspace, _request: Request, _body: Any) -> Any:
 
 
 def _picture(workspace: Workspace, _request: Request, _body: Any) -> Any:
-    sent = _jpeg(packed_pixels(workspace.screen))
+    sent = _image(packed_pixels(workspace.screen))
     sent.background = BackgroundTask(workspace.screen.fetched.set)
     return sent
 
@@ -272,9 +262,9 @@ async def _follow(workspace: Workspace, socket: WebSocket) -> None:
 def _target(workspace: Workspace, request: Request, _body: Any) -> Any:
     asked = request.query_params
     if not asked.keys() & {"light", "at"}:
-        return _jpeg(queries.target_jpeg(workspace.screen))
+        return _image(queries.target_jpeg(workspace.screen))
     found = workspace.drag.target(*_move(workspace, asked), held="held" in asked)
-    return Response(status_code=204) if found is None else _jpeg(found)
+    return Response(status_code=204) if found is None else _image(found)
 
 
 def _pick(workspace: Workspace, request: Request, _body: Any) -> Any:
@@ -283,9 +273,7 @@ def _pick(workspace: Workspace, request: Request, _body: Any) -> Any:
 
 
 def _outline(workspace: Workspace, request: Request, _body: Any) -> Any:
-    return Response(
-        queries.outline_png(workspace.screen, request.query_params["ghost"]), media_type="image/png", headers=_FRESH
-    )
+    return _image(queries.outline_png(workspace.screen, request.query_params["ghost"]), "png")
 
 
 def _ghosts(workspace: Workspace, _request: Request, _body: Any) -> Any:
@@ -298,17 +286,15 @@ def _section(workspace: Workspace, request: Request, _body: Any) -> Any:
 
 
 def _coating(workspace: Workspace, request: Request, _body: Any) -> Any:
-    svg = diagrams.coating_svg(workspace.session.project, int(request.query_params["row"]))
-    return Response(svg, media_type="image/svg+xml", headers=_FRESH)
+    return _image(diagrams.coating_svg(workspace.session.project, int(request.query_params["row"])), "svg+xml")
 
 
 def _colour_map(workspace: Workspace, request: Request, _body: Any) -> Any:
-    data = diagrams.colour_map(workspace.session.project, request.query_params["ghost"])
-    return Response(data, media_type="image/png", headers=_FRESH)
+    return _image(diagrams.colour_map(workspace.session.project, request.query_params["ghost"]), "png")
 
 
 def _mask(workspace: Workspace, _request: Request, _body: Any) -> Any:
-    return Response(diagrams.mask_png(workspace.session.project), media_type="image/png", headers=_FRESH)
+    return _image(diagrams.mask_png(workspace.session.project), "png")
 
 
 def _places(workspace: Workspace, _request: Request, _body: Any) -> Any:
@@ -322,9 +308,9 @@ def _library(_workspace: Workspace, _request: Request, _body: Any) -> Any:
 def _thumbnail(workspace: Workspace, request: Request, _body: Any) -> Any:
     kind, name = request.path_params["kind"], request.path_params["name"]
     if kind != "lens" or not is_own(name):
-        return _jpeg(thumbnail(kind, name))
+        return _image(thumbnail(kind, name))
     if (data := read_thumbnail(name)) is not None:
-        return _jpeg(data)
+        return _image(data)
     # the page asks again
     workspace.thumbnails.ask(name)
     return Response(status_code=204, headers=_FRESH)
@@ -353,11 +339,6 @@ def _import(workspace: Workspace, request: Request, body: Any) -> Any:
     return workspace.state() | {"reported": list(remarks)}
 
 
-def _open(workspace: Workspace, _request: Request, body: Any) -> Any:
-    workspace.session.open(str(body["text"]))
-    return workspace.state()
-
-
 def _save(workspace: Workspace, _request: Request, body: Any) -> Any:
     path = workspace.session.save(str(body["text"]))
     return workspace.state() | {"reported": f"Saved {path}"}
@@ -369,16 +350,6 @@ def _plate_lights(workspace: Workspace, request: Request, _body: Any) -> Any:
             raise Left
 
     return outlined(workspace.session, progress)
-
-
-def _find(workspace: Workspace, _request: Request, _body: Any) -> Any:
-    workspace.finder.start()
-    return workspace.state()
-
-
-def _stop_finding(workspace: Workspace, _request: Request, _body: Any) -> Any:
-    workspace.finder.stop()
-    return workspace.state()
 
 
 def _command(workspace: Workspace, _request: Request, _body: Any) -> Any:
@@ -440,21 +411,6 @@ def _seconds(body: Any) -> float:
     return min(max(float(body.get("seconds", 30.0)), 1.0), MOST_SECONDS)
 
 
-def _solve(workspace: Workspace, _request: Request, body: Any) -> Any:
-    workspace.solver.start(_seconds(body))
-    return workspace.state()
-
-
-def _colors(workspace: Workspace, _request: Request, body: Any) -> Any:
-    workspace.solver.start_colors(str(body.get("kind", "quarter-wave")), _seconds(body))
-    return workspace.state()
-
-
-def _stop(workspace: Workspace, _request: Request, _body: Any) -> Any:
-    workspace.solver.stop()
-    return workspace.state()
-
-
 def _accept(workspace: Workspace, _request: Request, body: Any) -> Any:
     reported = workspace.solver.accept(int(body["number"]))
     return workspace.state() | {"reported": reported}
@@ -464,14 +420,14 @@ def _candidate(workspace: Workspace, request: Request, _body: Any) -> Any:
     found, k = workspace.solver.fitting.found, int(request.path_params["k"])
     if not 0 <= k < len(found):
         raise ProjectError(f"there is no lens {k} among those found")
-    return _jpeg(found[k].picture)
+    return _image(found[k].picture)
 
 
 _FRESH = {"Cache-Control": "no-store"}
 
 
-def _jpeg(data: bytes) -> Response:
-    return Response(data, media_type="image/jpeg", headers=_FRESH)
+def _image(data: bytes | str, kind: str = "jpeg") -> Response:
+    return Response(data, media_type=f"image/{kind}", headers=_FRESH)
 
 
 _GET = {
@@ -483,10 +439,19 @@ _GET = {
     "/api/export/{kind}": _export, "/api/plate/lights": _plate_lights, "/api/candidate/{k}": _candidate,
 }  # fmt: skip
 _POST = {
-    "/api/do": _do, "/api/view": _view, "/api/undo": _undo, "/api/redo": _redo, "/api/expose": _expose,
-    "/api/rest": _rest, "/api/import": _import, "/api/open": _open, "/api/save": _save, "/api/solve": _solve,
-    "/api/colors": _colors, "/api/stop": _stop, "/api/accept": _accept,
-    "/api/plate/find": _find, "/api/plate/stop": _stop_finding,
+    "/api/do": _do, "/api/rest": _rest, "/api/import": _import, "/api/save": _save, "/api/accept": _accept,
+    "/api/view": _then_state(lambda workspace, body: workspace.session.set_view(dict(body))),
+    "/api/undo": _then_state(lambda workspace, _: workspace.session.undo()),
+    "/api/redo": _then_state(lambda workspace, _: workspace.session.redo()),
+    "/api/expose": _then_state(lambda workspace, _: workspace.screen.expose()),
+    "/api/open": _then_state(lambda workspace, body: workspace.session.open(str(body["text"]))),
+    "/api/solve": _then_state(lambda workspace, body: workspace.solver.start(_seconds(body))),
+    "/api/colors": _then_state(
+        lambda workspace, body: workspace.solver.start_colors(str(body.get("kind", "quarter-wave")), _seconds(body))
+    ),
+    "/api/stop": _then_state(lambda workspace, _: workspace.solver.stop()),
+    "/api/plate/find": _then_state(lambda workspace, _: workspace.finder.start()),
+    "/api/plate/stop": _then_state(lambda workspace, _: workspace.finder.stop()),
 }  # fmt: skip
 
 

@@ -55,6 +55,3 @@ class ThumbnailMaker:
                     self._child.kill()
                     self._child.wait()
             self._child = None
-
-
-__all__ = ["ThumbnailMaker"]

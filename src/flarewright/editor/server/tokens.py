@@ -6,7 +6,6 @@ import os
 import secrets
 import stat
 import sys
-from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -21,7 +20,7 @@ NAME = "editor-token"
 MOST_BYTES = 4096
 
 
-def token_of(file: Path | None, environment: Mapping[str, str] = os.environ) -> str:
+def token_of(file: Path | None) -> str:
     """Return the token of a file, of the environment, or the random one of this account.
 
     The random one stays the same when the editor starts again, so that open pages reconnect.
@@ -29,7 +28,6 @@ def token_of(file: Path | None, environment: Mapping[str, str] = os.environ) -> 
     Parameters
     ----------
     file : Path or None
-    environment : mapping of str to str
 
     Returns
     -------
@@ -42,7 +40,7 @@ def token_of(file: Path | None, environment: Mapping[str, str] = os.environ) -> 
     """
     if file is not None:
         return _read(file)
-    return environment.get(VARIABLE) or _kept(state_folder() / NAME)
+    return os.environ.get(VARIABLE) or _kept(state_folder() / NAME)
 
 
 def _read(file: Path) -> str:

@@ -11,7 +11,7 @@ from math import atan, degrees
 from pathlib import Path
 
 from ... import __version__
-from ...errors import FlarewrightError, LensError, OutputError, ProjectError
+from ...errors import FlarewrightError, LensError, OutputError, ProjectError, raised_as
 from ...io.files.atomic_write import write_bytes_atomically
 from ...io.files.door import expanded, outside
 from ...io.files.file_kind import LENS_SUFFIXES, kind_of
@@ -50,8 +50,7 @@ SUFFIXES: dict[str, str] = {
 def sample_project() -> Project:
     """Return the project of the first start: the picture of the README."""
     base = project_for_lens(SAMPLE)
-    shown: Project = base.replace(lights=(base.lights[0].replace(field_deg=SAMPLE_DEG),))
-    return shown
+    return base.replace(lights=(base.lights[0].replace(field_deg=SAMPLE_DEG),))
 
 
 def project_for_lens(lens: str | Lens) -> Project:
@@ -152,10 +151,8 @@ def _without_commands(words: str) -> str:
 
 def read_toml_of(path: Path) -> dict[str, object]:
     """Read TOML; raise a one-sentence error if it is invalid."""
-    try:
+    with raised_as(ProjectError):
         return read_toml(path, "a project or lens file")
-    except ValueError as error:
-        raise ProjectError(str(error)) from None
 
 
 def _is_project(data: dict[str, object]) -> bool:

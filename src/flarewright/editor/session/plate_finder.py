@@ -197,6 +197,3 @@ def page_words(words: str, session: Session) -> str:
     for option, label in _PAGE_WORDS.items():
         words = words.replace(option, label)
     return in_short(re.sub(r"\s+", " ", words), session.project, session.file)
-
-
-__all__ = ["Finding", "PlateFinder", "outlined", "page_words"]

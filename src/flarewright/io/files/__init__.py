@@ -3,7 +3,7 @@
 Readers call `text_file.read_toml` or `text_file.read_text` and turn validation errors into sentences with
 `sentences.validation_sentences`. Writers call `atomic_write.write_atomically`.
 
-- `atomic_write`: `write_atomically`, complete files or none
+- `atomic_write`: `write_atomically`, complete files or none; `make_folder`
 - `door`: `outside`, the one way to a file of the user; `sentences_for`, `refuse_claim`, `expanded`, `shown`
 - `file_lock`: `held`, `locked`, locks between processes
 - `file_kind`: `refuse_other_kind`, errors for a file of another kind than the wanted one

@@ -67,6 +67,14 @@ def write_atomically(
             temporary.unlink(missing_ok=True)
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those above it, if there is none; raises OutputError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot make the folder {folder}: {(error.strerror or str(error)).lower()}") from None
+
+
 def write_text_atomically(path: str | Path, text: str, *, newline: str | None = None, replace: bool = True) -> None:
     """Write a text file in UTF-8; `newline` as of `Path.write_text`, `replace` and errors as of `write_atomically`."""
 

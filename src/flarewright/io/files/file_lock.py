@@ -65,6 +65,3 @@ def locked(path: Path) -> Iterator[IO[bytes]]:
         while not held(file):
             time.sleep(_PAUSE_S)
         yield file
-
-
-__all__ = ["held", "locked"]

@@ -50,9 +50,7 @@ _HEADINGS = {
 
 
 def validation_sentences(
-    error: ValidationError,
-    data: Any = None,
-    unknown: Callable[[Keys], str] = lambda _: "",
+    error: ValidationError, data: Any = None, unknown: Callable[[Keys], str] = lambda _: ""
 ) -> list[str]:
     """Turn a pydantic ValidationError into sentences for the user; the only place that reads pydantic's messages.
 

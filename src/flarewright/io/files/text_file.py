@@ -175,12 +175,12 @@ def check_version(data: dict[str, Any], newest: int, file: str) -> None:
 
     Raises
     ------
-    ValueError
+    FileError
         When the file is newer.
     """
     version = data.get("schema_version", 1)
     if isinstance(version, int) and version > newest:
-        raise ValueError(f"{file} has schema_version {version}, newer than this program's {newest}: update Flarewright")
+        raise FileError(f"{file} has schema_version {version}, newer than this program's {newest}: update Flarewright")
 
 
 def lower_first(text: str) -> str:

@@ -55,7 +55,11 @@ def record_of(
                 return None, [*found, total]
             return None, [total]
         return None, validation_sentences(error, data, _nearest(read)) if say is None else say(error)
-    problems = type_differences(data, record)
+    # like "iris.blades should be a whole number, not true"
+    problems = [
+        f"{key_place(keys)} should be {wanted}, not {shorten(value)}"
+        for keys, value, wanted in _type_differences([], data, record)
+    ]
     return (None, problems) if problems else (record, [])
 
 
@@ -74,29 +78,8 @@ def _nearest(read: Callable[[Any], Any]) -> Callable[[Keys], str]:
     return lambda keys: did_you_mean(str(keys[-1]), known) if keys else ""
 
 
-def type_differences(data: Any, record: Any) -> list[str]:
-    """List the values whose type in the record differs from that in the file.
-
-    Parameters
-    ----------
-    data : object
-        As read from the file.
-    record : object
-        The record made of it, or a list or table of records. Parts of a different structure than `data` are not
-        compared.
-
-    Returns
-    -------
-    list of str
-        Like "iris.blades should be a whole number, not true".
-    """
-    return [
-        f"{key_place(keys)} should be {wanted}, not {shorten(value)}"
-        for keys, value, wanted in _type_differences([], data, record)
-    ]
-
-
 def _type_differences(keys: Keys, data: Any, record: Any) -> Iterator[tuple[Keys, Any, str]]:
+    """Yield place, value and expected type of each value of a file whose type in the record differs."""
     if isinstance(data, dict):
         held = dict(record) if isinstance(record, BaseModel | dict) else {}
         for key, value in data.items():

@@ -9,8 +9,6 @@ from typing import Any, BinaryIO
 from ...errors import FileError, optional
 from ..files.door import outside, read_limit_bytes, refuse_claim, shown
 
-__all__ = ["READS", "av_module", "exact_flags", "opened", "video_of"]
-
 READS = "give MP4, MOV, MKV, WebM, AVI or MXF, or an image sequence"
 """End of the message about a film that cannot be read."""
 

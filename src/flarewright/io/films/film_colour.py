@@ -7,23 +7,22 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...typing import Floats, Pixels
+from ...colorimetry import D65_WHITE, rgb_to_xyz
+from ...colorimetry import PRIMARIES as KNOWN
+from ...typing import Pixels
 from ..images.transfer import Transfer, decoded
-
-__all__ = ["PRIMARIES", "WEIGHTS", "FilmCoding", "linear_pixels", "signal_of", "to_rec709"]
 
 WEIGHTS = {"bt709": (0.2126, 0.0722), "bt601": (0.299, 0.114), "bt2020": (0.2627, 0.0593), "smpte240m": (0.212, 0.087)}
 """Weights of red and blue in luma, of each matrix (ITU-R BT.709, BT.601 and BT.2020, SMPTE 240M)."""
 
-_D65 = (0.3127, 0.3290)
 PRIMARIES = {
-    "bt709": (0.64, 0.33, 0.30, 0.60, 0.15, 0.06),
-    "smpte170m": (0.63, 0.34, 0.31, 0.595, 0.155, 0.07),
-    "bt470bg": (0.64, 0.33, 0.29, 0.60, 0.15, 0.06),
-    "bt2020": (0.708, 0.292, 0.17, 0.797, 0.131, 0.046),
-    "p3": (0.68, 0.32, 0.265, 0.69, 0.15, 0.06),
+    "bt709": KNOWN["lin_rec709_scene"],
+    "smpte170m": (0.63, 0.34, 0.31, 0.595, 0.155, 0.07, *D65_WHITE),
+    "bt470bg": (0.64, 0.33, 0.29, 0.60, 0.15, 0.06, *D65_WHITE),
+    "bt2020": KNOWN["lin_rec2020_scene"],
+    "p3": KNOWN["lin_p3d65_scene"],
 }
-"""Chromaticities x and y of red, green and blue; white is D65 (ITU-T H.273, table 2)."""
+"""Chromaticities x and y of red, green, blue and white (ITU-T H.273, table 2)."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +69,7 @@ def linear_pixels(codes: np.ndarray, coding: FilmCoding, transfer: Transfer | No
     linear = decoded(signal_of(codes, coding), transfer or coding.transfer)
     if coding.primaries == "bt709":
         return linear
-    found: Pixels = linear @ to_rec709(coding.primaries).T
-    return found
+    return linear @ to_rec709(coding.primaries).T
 
 
 def signal_of(codes: np.ndarray, coding: FilmCoding) -> Pixels:
@@ -112,14 +110,5 @@ def signal_of(codes: np.ndarray, coding: FilmCoding) -> Pixels:
 @lru_cache
 def to_rec709(primaries: str) -> Pixels:
     """Return the matrix from linear light of some primaries to Rec.709, shape (3, 3), float32."""
-    found: Pixels = (np.linalg.inv(_to_xyz("bt709")) @ _to_xyz(primaries)).astype(np.float32)
-    return found
-
-
-def _to_xyz(primaries: str) -> Floats:
-    """Return the matrix to XYZ: each primary has the amount with which they add up to white (SMPTE RP 177)."""
-    xy = np.array(PRIMARIES[primaries]).reshape(3, 2)
-    columns = np.stack((xy[:, 0] / xy[:, 1], np.ones(3), (1.0 - xy.sum(axis=1)) / xy[:, 1]))
-    x, y = _D65
-    found: Floats = columns * np.linalg.solve(columns, np.array([x / y, 1.0, (1.0 - x - y) / y]))
-    return found
+    to_xyz = rgb_to_xyz(PRIMARIES[primaries])
+    return (np.linalg.inv(rgb_to_xyz(PRIMARIES["bt709"])) @ to_xyz).astype(np.float32)

@@ -19,8 +19,6 @@ from ..images.transfer import Transfer
 from .decoder import opened, video_of
 from .film_colour import FilmCoding
 
-__all__ = ["Film", "open_film"]
-
 MOST_FRAMES = 1_000_000
 """Largest number of frames of a film."""
 

@@ -20,8 +20,6 @@ from .film_colour import linear_pixels
 from .film_file import Film, open_film
 from .film_time_code import time_code_after
 
-__all__ = ["read_film_frame"]
-
 # key frames that are tried, before decoding begins at the first frame
 _TRIES = 2
 _BITS = 8

@@ -8,8 +8,6 @@ from typing import Any
 
 from ..images.exr_attributes import time_code
 
-__all__ = ["code_text", "time_code_after"]
-
 _CODE = re.compile(r"(\d{1,2}):(\d{2}):(\d{2})([:;.])(\d{2})")
 # numbers that a drop-frame code leaves out in each minute but every tenth (SMPTE ST 12-1)
 _DROPPED, _MINUTE, _TEN_MINUTES = 2, 1798, 17982

@@ -17,8 +17,6 @@ from ...errors import FileError, OutputError, optional
 from ..files.atomic_write import write_atomically
 from .decoder import exact_flags, opened
 
-__all__ = ["FILM_CODECS", "FilmCodec", "check_film_name", "comment_of", "join_films", "padded_size", "write_film"]
-
 # quality of H.264: a difference of about one code of 255; more bits for dark gradients, which a flare consists of. With
 # x264's macroblock tree the bytes of pictures below some 100 px differ from run to run
 _QUALITY = (("crf", "14"), ("aq-mode", "3"), ("mbtree", "0"), ("preset", "medium"))

@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from ...model.matte import GhostMatte
 from ...typing import Pixels
 
-__all__ = ["NAME", "identifier", "matte_attributes", "matte_layers", "matte_names", "murmur3_32"]
-
 NAME = "CryptoGhost"
 """Name of the Cryptomatte; its layers are this and two digits."""
 
@@ -103,10 +101,7 @@ def matte_layers(matte: GhostMatte) -> tuple[tuple[str, Pixels], ...]:
     values: NDArray[np.float32] = bits.view(np.float32)[matte.objects]
     coverage = matte.coverage
     return tuple(
-        (
-            f"{NAME}{k:02d}",
-            np.stack([values[2 * k], coverage[2 * k], values[2 * k + 1], coverage[2 * k + 1]], axis=-1),
-        )
+        (f"{NAME}{k:02d}", np.stack([values[2 * k], coverage[2 * k], values[2 * k + 1], coverage[2 * k + 1]], axis=-1))
         for k in range(len(values) // 2)
     )
 

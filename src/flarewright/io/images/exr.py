@@ -1,6 +1,6 @@
 """OpenEXR files: layers as parts, the project in the metadata.
 
-`write_exr` and `read_exr` are for our own files; `read_exr_plane` and `read_exr_colour` read files of other programs.
+`write_exr` and `read_exr` are for our own files; `read_exr_plane` and `read_exr_layer` read files of other programs.
 
 Every program opens the first part: the first layer (the beauty) with plain channels R, G, B. Each further layer is a
 separate part, named after the layer, with channels `layer.R`, `layer.G`, `layer.B`; compositing programs list it
@@ -37,7 +37,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import FileError, FlarewrightError, OutputError
+from ...colorimetry import PRIMARIES
+from ...errors import FileError, FlarewrightError, OutputError, raised_as
 from ...model.layer import Layer
 from ...model.matte import GhostMatte
 from ...model.project.camera import Colorspace
@@ -46,7 +47,7 @@ from ..files.atomic_write import write_atomically
 from ..files.door import outside, printable, sentences_for, shown
 from ..files.silence_libraries import silenced
 from .cryptomatte import matte_attributes, matte_layers, matte_names
-from .file_space import PRIMARIES, FileSpace
+from .file_space import FileSpace
 from .half import HALF_MAX, half_scale, rounded_to_half
 
 # the built-in spaces by their names of the ASWF Color Interop Forum
@@ -287,11 +288,8 @@ def read_exr(path: str | PathLike[str]) -> ExrContents:
     OutputError
         When it is not a readable EXR file.
     """
-    try:
-        with sentences_for(path, "an EXR file"):
-            return _contents(_open_parts(path, "an EXR file"))
-    except FileError as error:
-        raise OutputError(str(error)) from error
+    with raised_as(OutputError), sentences_for(path, "an EXR file"):
+        return _contents(_open_parts(path, "an EXR file"))
 
 
 def _contents(file: Any) -> ExrContents:
@@ -374,14 +372,12 @@ def read_exr_plane(path: str | PathLike[str], choices: Sequence[Sequence[str]], 
         return _plane(*_part_with(_open_parts(path, what), choices))
 
 
-def read_exr_grey(
-    path: str | PathLike[str], choices: Sequence[Sequence[str]], what: str = "an image"
-) -> tuple[Floats, Floats | None]:
+def read_exr_grey(path: str | PathLike[str], choices: Sequence[Sequence[str]]) -> tuple[Floats, Floats | None]:
     """Read a grey picture and its alpha, opening the file once.
 
     Parameters
     ----------
-    path, choices, what
+    path, choices
         As of `read_exr_plane`.
 
     Returns
@@ -394,34 +390,11 @@ def read_exr_grey(
     FileError
         As `read_exr_plane`.
     """
-    with sentences_for(path, what, "give an EXR file"):
-        file = _open_parts(path, what, 16)
+    with sentences_for(path, "an image", "give an EXR file"):
+        file = _open_parts(path, "an image", 16)
         grey = _plane(*_part_with(file, choices))
         part = next((part for part in file.parts if "A" in part.channels), None)
         return grey, None if part is None else _plane(part, ("A",))
-
-
-def read_exr_colour(path: str | PathLike[str], what: str = "an EXR file") -> Pixels:
-    """Read the colours of any EXR file within its display window.
-
-    Parameters
-    ----------
-    path : path
-        With channels R, G and B, or a single channel, or Y (grey).
-    what : str
-        Expected kind of file, for messages.
-
-    Returns
-    -------
-    ndarray, shape (H, W, 3), float32
-        0 outside the data window, and for values that are infinite or NaN.
-
-    Raises
-    ------
-    FileError
-        When it is not a readable EXR file, or has none of these channels.
-    """
-    return read_exr_layer(path, None, what)[0]
 
 
 def read_exr_layer(
@@ -528,11 +501,8 @@ def exr_size(path: str | PathLike[str]) -> tuple[int, int]:
     """
     import OpenEXR
 
-    try:
-        with outside(path, "an EXR file"):
-            low, high = OpenEXR.File(str(path), header_only=True).header()["dataWindow"]
-    except FileError as error:
-        raise OutputError(str(error)) from error
+    with raised_as(OutputError), outside(path, "an EXR file"):
+        low, high = OpenEXR.File(str(path), header_only=True).header()["dataWindow"]
     return int(high[0] - low[0]) + 1, int(high[1] - low[1]) + 1
 
 
@@ -554,11 +524,8 @@ def scale_in_exr(path: str | PathLike[str]) -> float:
     """
     import OpenEXR
 
-    try:
-        with outside(path, "an EXR file", remedy="give an EXR file"):
-            return _scale(OpenEXR.File(str(path), header_only=True).parts[0])
-    except FileError as error:
-        raise OutputError(str(error)) from error
+    with raised_as(OutputError), outside(path, "an EXR file", remedy="give an EXR file"):
+        return _scale(OpenEXR.File(str(path), header_only=True).parts[0])
 
 
 def _prefixed(header: Mapping[str, Any], prefix: str) -> dict[str, Any]:

@@ -6,8 +6,6 @@ from fractions import Fraction
 from math import inf
 from typing import Any
 
-__all__ = ["shot_attributes", "time_code"]
-
 # a time code counts at most 30 frames a second (SMPTE ST 12-1)
 _MOST_CODED = 30
 _DAY_S = 86400

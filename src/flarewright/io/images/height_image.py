@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import FileError, LensError
+from ...errors import LensError, raised_as
 from ...typing import Floats
 from .mask_image import LARGEST, read_grey
 
@@ -36,10 +36,8 @@ def read_heights(path: str | Path) -> tuple[tuple[float, ...], ...]:
     place = Path(path)
     if not place.is_file():
         raise LensError(f"{place}: there is no such figure image; give the path of a PNG or EXR file")
-    try:
+    with raised_as(LensError):
         grey = read_grey(place)
-    except FileError as error:
-        raise LensError(str(error)) from error
     if min(grey.shape) < 4 or max(grey.shape) > LARGEST:
         raise LensError(
             f"{place}: a figure image has 4 to {LARGEST} pixels a side, this one is {grey.shape[1]}x{grey.shape[0]}"

@@ -8,7 +8,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import FileError, ProjectError
+from ...errors import ProjectError, raised_as
 from ...typing import Floats
 from ..files.door import outside
 from .exr import read_exr_grey
@@ -40,10 +40,8 @@ def read_mask(path: str | Path, what: str = "iris") -> Floats:
     place = Path(path)
     if not place.is_file():
         raise ProjectError(f"{place}: there is no such {what} image; give the path of a PNG or EXR file")
-    try:
+    with raised_as(ProjectError):
         read = read_grey(place)
-    except FileError as error:
-        raise ProjectError(str(error)) from error
     if min(read.shape) < 2 or max(read.shape) > LARGEST:
         raise ProjectError(
             f"{place}: an image of the {what} has 2 to {LARGEST} pixels a side, "

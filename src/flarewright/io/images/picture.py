@@ -37,10 +37,7 @@ def read_picture(path: Path) -> Pixels:
         return np.asarray(np.nan_to_num(pixels), dtype=np.float32)
     from PIL import Image
 
-    with (
-        outside(path, "an image", pixel_bytes=16, remedy="give PNG, JPEG or EXR") as file,
-        Image.open(file) as image,
-    ):
+    with outside(path, "an image", pixel_bytes=16, remedy="give PNG, JPEG or EXR") as file, Image.open(file) as image:
         coded = np.asarray(image.convert("RGB"), dtype=np.float32) / np.float32(255.0)
     return decode_srgb(coded)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import FileError, ProjectError
+from ...errors import ProjectError, raised_as
 from ...typing import Pixels
 from .exr import read_exr_plane
 from .half import HALF_MAX
@@ -19,8 +19,6 @@ from .mask_image import read_grey
 LARGEST = 16384
 # names of depth channels, in order of preference
 DEPTH_NAMES = (("Z",), ("depth",), ("depth.Z",), ("Depth.Z",), ("R",))
-
-__all__ = ["read_depth", "read_matte"]
 
 
 def read_matte(path: str | os.PathLike[str]) -> Pixels:
@@ -48,10 +46,8 @@ def read_matte(path: str | os.PathLike[str]) -> Pixels:
 
 @lru_cache(maxsize=8)
 def _matte(path: str, _: int) -> Pixels:
-    try:
+    with raised_as(ProjectError):
         grey = read_grey(Path(path), np.float32)
-    except FileError as error:
-        raise ProjectError(str(error)) from error
     if not np.isfinite(grey).all():
         raise ProjectError(f"{path}: the holdout image has infinite or NaN values; give 0 to 1")
     return _sized(path, np.clip(grey, 0.0, 1.0, out=grey))
@@ -82,10 +78,8 @@ def read_depth(path: str | os.PathLike[str]) -> Pixels:
 
 @lru_cache(maxsize=8)
 def _depth(path: str, _: int) -> Pixels:
-    try:
+    with raised_as(ProjectError):
         depth = read_exr_plane(path, DEPTH_NAMES, "a depth plate")
-    except FileError as error:
-        raise ProjectError(str(error)) from error
     empty = ~np.isfinite(depth) | (depth <= 0.0) | (depth == HALF_MAX)
     return _sized(path, np.where(empty, np.inf, depth))
 

@@ -20,8 +20,6 @@ from .half import HALF_MAX
 from .picture import SCREEN
 from .transfer import Transfer, decoded, white_of
 
-__all__ = ["PLATE_SUFFIXES", "PlatePicture", "read_plate"]
-
 _TIFF = (".tif", ".tiff")
 PLATE_SUFFIXES = (".exr", *_TIFF, *SCREEN)
 """Kinds of files that a plate can be."""
@@ -203,10 +201,7 @@ def _depth(image: Any) -> int:
 
 def _tiff(path: Path, transfer: Transfer | None) -> PlatePicture:
     tifffile = optional("tifffile", "photo", f"reading {shown(path)}")
-    with (
-        outside(path, "a plate", remedy="save it as EXR or 16-bit TIFF") as stream,
-        tifffile.TiffFile(stream) as file,
-    ):
+    with outside(path, "a plate", remedy="save it as EXR or 16-bit TIFF") as stream, tifffile.TiffFile(stream) as file:
         page = file.pages[0]
         shape, size = tuple(page.shape), np.dtype(page.dtype).itemsize
         # the values, and linear pixels

@@ -10,8 +10,6 @@ from ...errors import ProjectError
 
 SIZE_PX = (480, 270)
 
-__all__ = ["SIZE_PX", "thumbnail", "thumbnail_path"]
-
 
 def thumbnail(kind: str, name: str) -> bytes:
     """Return the thumbnail of a lens or a look of the library.

@@ -62,13 +62,11 @@ def white_of(transfer: Transfer) -> float:
 
 def encoded_rec709(light: Pixels) -> Pixels:
     """Return the codes of linear light from 0 to 1, by the camera's curve of ITU-R BT.709; the inverse of `decoded`."""
-    found: Pixels = np.where(light < 0.018, 4.5 * light, 1.099 * np.maximum(light, 0.018) ** 0.45 - 0.099)
-    return found
+    return np.where(light < 0.018, 4.5 * light, 1.099 * np.maximum(light, 0.018) ** 0.45 - 0.099)
 
 
 def _rec709(codes: Pixels) -> Pixels:
-    found: Pixels = np.where(codes < 0.081, codes / 4.5, ((codes + 0.099) / 1.099) ** (1.0 / 0.45))
-    return found
+    return np.where(codes < 0.081, codes / 4.5, ((codes + 0.099) / 1.099) ** (1.0 / 0.45))
 
 
 def _pq(codes: Pixels) -> Pixels:
@@ -76,8 +74,7 @@ def _pq(codes: Pixels) -> Pixels:
     c1, c2, c3 = 3424.0 / 4096.0, 2413.0 / 128.0, 2392.0 / 128.0
     root = np.minimum(codes.astype(np.float64), 1.0) ** (1.0 / m2)
     light = 10000.0 * (np.maximum(root - c1, 0.0) / (c2 - c3 * root)) ** (1.0 / m1)
-    found: Pixels = (light / HDR_WHITE_CD_M2).astype(np.float32)
-    return found
+    return (light / HDR_WHITE_CD_M2).astype(np.float32)
 
 
 def _hlg(codes: Pixels) -> Pixels:

@@ -22,11 +22,11 @@ import re
 from collections.abc import Callable
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from flarewright.errors import ProjectError
+from flarewright.errors import ProjectError, raised_as
 from flarewright.model import (
     AsLens,
     Bare,
@@ -41,14 +41,12 @@ from flarewright.model import (
     Stack,
     Standard,
 )
-from flarewright.model.lens.coating import StandardName
+from flarewright.model.lens.coating import STANDARD_NAMES
 from flarewright.model.project.project import CHOICES, everywhere
 
 from ..files.sentences import did_you_mean, shorten, validation_sentences
 from ..files.text_file import read_toml
 from ..files.type_slips import record_of
-
-STANDARD_NAMES: tuple[StandardName, ...] = get_args(StandardName)
 
 HELP = (
     "write none, quarter-wave:550, quarter-wave:550:ideal, film:1.38:96.4, stack:1.38:96.4,2.1:120 or one of "
@@ -241,10 +239,8 @@ def read_coating_file(path: str | Path) -> CoatingChoice:
     ProjectError
         When the file cannot be read, has none or several of the keys, or has invalid entries; lists all of these.
     """
-    try:
+    with raised_as(ProjectError):
         table = read_toml(path, "a coating file")
-    except ValueError as error:
-        raise ProjectError(str(error)) from None
     if set(table) == {"coating"}:
         return Everywhere(coating=coating_from(table["coating"]) or Bare())
     for key, place in (("rows", "row"), ("in_turn", "coating")):

@@ -173,8 +173,7 @@ def _setting(
         elif active.entrance_pupil_diameter is not None:
             changes["entrance_pupil_diameter"] = aperture * mm
     changes |= _field(values, commands, stated)
-    setting: Configuration = active.replace(**changes)
-    return setting
+    return active.replace(**changes)
 
 
 def _field(values: Mapping[Place, float], commands: Commands, stated: Stated) -> dict[str, float | None]:
@@ -194,6 +193,3 @@ def _field(values: Mapping[Place, float], commands: Commands, stated: Stated) ->
     if stated.active.image_height is not None:
         return {"image_height": largest * stated.mm}
     return {"field_deg": largest} if stated.active.field_deg is not None and largest < 90.0 else {}
-
-
-__all__ = ["MOST", "NOWHERE", "Commands", "Place", "Stated", "settings"]

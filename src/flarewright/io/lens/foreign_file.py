@@ -7,12 +7,16 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import zip_longest
 from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
 
 from flarewright.errors import FileError, LensError
-from flarewright.model.lens.raw_lens import RawSequence
+from flarewright.model import Surface
+from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
 
 from ..files.door import sentences_for
-from ..files.sentences import summary
+from ..files.sentences import summary, validation_sentences
 from ..files.text_file import read_bytes
 
 MOST_SURFACES = 500
@@ -44,6 +48,22 @@ def whole(path: str | Path, raw: RawSequence | None, problems: list[str]) -> Raw
     if raw is None or problems:
         raise LensError(summary(str(path), problems), tuple(problems))
     return raw
+
+
+def sequence_row(
+    where: str, problems: list[str], before: int, *, number: int, stop: bool, automatic_rim: bool = False,
+    **surface: Any,
+) -> SequenceRow | None:  # fmt: skip
+    """Return the row of a surface; None if there are more than `before` problems, with those of its values."""
+    if surface["medium"] is not None and surface["thickness"] < 0.0:
+        problems.append(f"{where}: glass cannot be {surface['thickness']:g} mm thick")
+    if len(problems) > before:
+        return None
+    try:
+        return SequenceRow(number=number, surface=Surface(**surface), stop=stop, automatic_rim=automatic_rim)
+    except ValidationError as error:
+        problems += [f"{where}: {sentence}" for sentence in validation_sentences(error)]
+        return None
 
 
 def decoded(data: bytes) -> str:
@@ -84,16 +104,3 @@ def largest_field(x: Sequence[float | None], y: Sequence[float | None]) -> float
         Columns of a file, of any unit; a missing number is 0.
     """
     return max((math.hypot(a or 0.0, b or 0.0) for a, b in zip_longest(x, y)), default=0.0)
-
-
-__all__ = [
-    "INFINITE",
-    "MOST_SURFACES",
-    "decoded",
-    "json_number",
-    "largest_field",
-    "lens_data",
-    "lens_errors",
-    "number_of",
-    "whole",
-]

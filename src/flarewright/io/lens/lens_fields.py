@@ -44,6 +44,14 @@ class NumberField:
             return f"is {shorten(value)}: it must be {'below' if self.high_open else 'at most'} {self.high:g}{unit}"
         return None
 
+    def read(self, value: object, where: str, problems: list[str]) -> float | None:
+        """Return a valid value as a number; None for an invalid one, whose error is appended."""
+        refusal = self.refuse(value)
+        if refusal is None:
+            return float(value)  # type: ignore[arg-type]
+        problems.append(f"{where} {refusal}")
+        return None
+
     def schema(self) -> dict[str, Any]:
         """Return the field's JSON Schema."""
         return {
@@ -79,11 +87,7 @@ ROW_NUMBERS = {
 RADIUS = NumberField('radius of curvature or "flat"; positive: the centre lies behind the vertex', -1e9, 1e9)
 CURVATURE = NumberField("1 / radius, instead of `radius`; 0 is flat", -1e3, 1e3, unit="1/mm")
 
-TOP_TEXTS = {
-    "name": "name of the lens",
-    "source": "origin of the numbers, such as the patent",
-    "notes": "observations",
-}
+TOP_TEXTS = {"name": "name of the lens", "source": "origin of the numbers, such as the patent", "notes": "observations"}
 
 TOP_KEYS = (
     "schema_version",

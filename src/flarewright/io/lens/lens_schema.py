@@ -6,7 +6,8 @@ from typing import Any
 
 from flarewright.model import Iris
 
-from .coating_text import HELP, STANDARD_NAMES
+from ...model.lens.coating import STANDARD_NAMES
+from .coating_text import HELP
 from .lens_fields import CURVATURE, RADIUS, ROW_NUMBERS, TOP_NUMBERS, TOP_TEXTS
 from .scatter_text import scatter_schema
 from .shape_fields import elements_schema, positions_schema, shape_schema

@@ -73,11 +73,7 @@ def contradicts(known: CatalogueGlass, n_d: float, v_d: float | None, tolerance:
 
 
 def attach_known(
-    glass: str,
-    known: CatalogueGlass,
-    n_d: float | None,
-    v_d: float | None,
-    tolerance: float = _OWN_INDEX_TOLERANCE,
+    glass: str, known: CatalogueGlass, n_d: float | None, v_d: float | None, tolerance: float = _OWN_INDEX_TOLERANCE
 ) -> tuple[Medium, Finding]:
     """Return the medium of a catalogue glass, or that of stated numbers that contradict it.
 

@@ -56,7 +56,7 @@ def read_shape(entry: dict[str, Any], where: str, folder: Path | None, problems:
         Fields for `model.Surface`.
     """
     values: dict[str, Any] = {}
-    if "conic_x" in entry and (number := _number(entry["conic_x"], f"{where}: conic_x", CONIC_X, problems)) is not None:
+    if "conic_x" in entry and (number := CONIC_X.read(entry["conic_x"], f"{where}: conic_x", problems)) is not None:
         values["conic_x"] = number
     for key, first, second in (("asphere", "A4", "A6"), ("odd_asphere", "A3", "A5")):
         if key not in entry:
@@ -79,7 +79,7 @@ def read_elements(table: object, problems: list[str]) -> tuple[Element, ...]:
     found = []
     for where, entry in _tables(table, "element", "rows = [FIRST, LAST]", problems):
         before = len(problems)
-        _unknown(entry, ELEMENT_KEYS, where, problems)
+        unknown_keys(entry, ELEMENT_KEYS, f"{where}: ", problems)
         rows = entry.get("rows")
         if not (isinstance(rows, list) and len(rows) == 2 and all(type(row) is int for row in rows)):
             problems.append(f"{where}: rows is {_stated(rows)}: give its first and last row, rows = [0, 2] for example")
@@ -94,7 +94,7 @@ def read_positions(table: object, problems: list[str]) -> tuple[Position, ...]:
     found = []
     for where, entry in _tables(table, "position", "name and gaps", problems):
         before = len(problems)
-        _unknown(entry, ("name", "gaps", *POSITION_NUMBERS), where, problems)
+        unknown_keys(entry, ("name", "gaps", *POSITION_NUMBERS), f"{where}: ", problems)
         name, gaps = entry.get("name"), entry.get("gaps")
         if not isinstance(name, str) or not name.strip():
             problems.append(f'{where}: name is {_stated(name)}: give a name, such as name = "wide"')
@@ -102,11 +102,11 @@ def read_positions(table: object, problems: list[str]) -> tuple[Position, ...]:
             problems.append(f"{where}: gaps is {_stated(gaps)}: give the thickness behind rows, gaps = {{ 5 = 8.78 }}")
             gaps = {}
         fields: dict[str, Any] = {
-            key: _number(entry[key], f"{where}: {key}", field, problems)
+            key: field.read(entry[key], f"{where}: {key}", problems)
             for key, field in POSITION_NUMBERS.items()
             if key in entry
         }
-        read = [(int(row), _number(gap, f"{where}: gap behind row {row}", GAP, problems)) for row, gap in gaps.items()]
+        read = [(int(row), GAP.read(gap, f"{where}: gap behind row {row}", problems)) for row, gap in gaps.items()]
         if len(problems) == before:
             found.append(Position(name=str(name), gaps=tuple((row, gap or 0.0) for row, gap in read), **fields))
     return tuple(found)
@@ -162,7 +162,7 @@ def _figure(value: object, where: str, folder: Path | None, problems: list[str])
         problems.append(f"{where} is {shorten(value)}: a table like {{ zernike_nm = {{ 5 = 30 }} }} was expected")
         return None
     before = len(problems)
-    _unknown(value, FIGURE_KEYS, where, problems)
+    unknown_keys(value, FIGURE_KEYS, f"{where}: ", problems)
     fields: dict[str, Any] = {}
     if "zernike_nm" in value and "zernike_waves" in value:
         problems.append(f"{where}: zernike_nm and zernike_waves are both given: keep one")
@@ -175,7 +175,7 @@ def _figure(value: object, where: str, folder: Path | None, problems: list[str])
         else:
             fields["image"] = str(((folder or Path()) / value["image"]).absolute())
     if "peak_valley_nm" in value:
-        fields["peak_valley_nm"] = _number(value["peak_valley_nm"], f"{where}: peak_valley_nm", HEIGHT_NM, problems)
+        fields["peak_valley_nm"] = HEIGHT_NM.read(value["peak_valley_nm"], f"{where}: peak_valley_nm", problems)
     if not value:
         problems.append(f"{where} is empty: give zernike_nm, or image and peak_valley_nm")
     if len(problems) > before:
@@ -196,7 +196,7 @@ def _zernike(value: object, where: str, unit_nm: float, problems: list[str]) -> 
         if not (key.isdecimal() and 2 <= int(key) <= MOST_NOLL):
             problems.append(f"{where}: {shorten(key)} is no term: Noll's index runs from 2 (tilt) to {MOST_NOLL}")
             continue
-        number = _number(amplitude, f"{where}: term {key}", HEIGHT_NM, problems)
+        number = HEIGHT_NM.read(amplitude, f"{where}: term {key}", problems)
         if number is not None and abs(number * unit_nm) > LARGEST_NM:
             problems.append(f"{where}: term {key} is {number:g}: a figure error is at most {LARGEST_NM / 1e3:g} um")
         elif number is not None:
@@ -319,19 +319,12 @@ def _numbers(value: object, where: str, field: NumberField, problems: list[str])
     if not isinstance(value, list):
         problems.append(f"{where} is {shorten(value)}, a list of numbers was expected")
         return None
-    found = [_number(item, f"{where}[{k}]", field, problems) for k, item in enumerate(value)]
+    found = [field.read(item, f"{where}[{k}]", problems) for k, item in enumerate(value)]
     return None if None in found else tuple(item for item in found if item is not None)
 
 
-def _number(value: object, where: str, field: NumberField, problems: list[str]) -> float | None:
-    refusal = field.refuse(value)
-    if refusal is None:
-        return float(value)  # type: ignore[arg-type]
-    problems.append(f"{where} {refusal}")
-    return None
-
-
-def _unknown(table: dict[str, Any], known: tuple[str, ...], where: str, problems: list[str]) -> None:
+def unknown_keys(table: dict[str, Any], known: tuple[str, ...], where: str, problems: list[str]) -> None:
+    """Append an error for each unknown key of a table; `where` begins its sentence."""
     problems += [
-        f"{where}: {shorten(key)} is not a known key{did_you_mean(key, known)}" for key in table if key not in known
+        f"{where}{shorten(key)} is not a known key{did_you_mean(key, known)}" for key in table if key not in known
     ]

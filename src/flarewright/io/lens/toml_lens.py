@@ -29,25 +29,15 @@ from flarewright.model.lens.raw_lens import LensReading, RawLens, RawSequence
 
 from ..files.door import shown
 from ..files.file_kind import OPTILAND_KEY, foreign_hint, lens_key, refuse_other_kind
-from ..files.sentences import count, did_you_mean, shorten, summary, validation_sentences
+from ..files.sentences import count, shorten, summary, validation_sentences
 from ..files.text_file import read_bytes, read_toml
 from . import media
 from .coating_text import coating_from
 from .foreign_file import MOST_SURFACES
 from .formats import codev, dotlens, optiland, oslo, realflare, tables
-from .lens_fields import (
-    CURVATURE,
-    RADIUS,
-    ROW_NUMBERS,
-    STOP_KEYS,
-    SURFACE_KEYS,
-    TOP_KEYS,
-    TOP_NUMBERS,
-    TOP_TEXTS,
-    NumberField,
-)
+from .lens_fields import CURVATURE, RADIUS, ROW_NUMBERS, STOP_KEYS, SURFACE_KEYS, TOP_KEYS, TOP_NUMBERS, TOP_TEXTS
 from .scatter_text import read_scatter
-from .shape_fields import read_elements, read_positions, read_shape
+from .shape_fields import read_elements, read_positions, read_shape, unknown_keys
 from .zemax import reader as zemax
 
 _FOREIGN: dict[str, Callable[[str | Path], RawLens | RawSequence]] = {
@@ -181,7 +171,7 @@ def _top_level(table: dict[str, Any], folder: Path | None, problems: list[str]) 
         problems.append("schema_version is missing: begin the file with schema_version = 1")
     elif isinstance(version, bool) or version != 1:
         problems.append(f"schema_version is {shorten(version)}: this version of Flarewright reads 1")
-    _unknown_keys(table, TOP_KEYS, "", problems)
+    unknown_keys(table, TOP_KEYS, "", problems)
     fields: dict[str, Any] = {}
     for key in TOP_TEXTS:
         value = table.get(key, "")
@@ -194,13 +184,13 @@ def _top_level(table: dict[str, Any], folder: Path | None, problems: list[str]) 
     if "f_number" not in table:
         problems.append("f_number is missing: it sets the size of the stop, add f_number = 2.8 for example")
     for key, field in TOP_NUMBERS.items():
-        if key in table and (value := _number(table[key], key, field, problems)) is not None:
+        if key in table and (value := field.read(table[key], key, problems)) is not None:
             fields[key] = value
     iris = table.get("iris", {})
     if not isinstance(iris, dict):
         problems.append(f"iris is {shorten(iris)}, a table was expected: [iris] with blades = 5 for example")
     else:
-        _unknown_keys(iris, tuple(Iris.model_fields), "iris: ", problems)
+        unknown_keys(iris, tuple(Iris.model_fields), "iris: ", problems)
         try:
             fields["iris"] = _iris(iris, folder)
         except ValidationError as error:
@@ -212,8 +202,7 @@ def _iris(table: dict[str, Any], folder: Path | None) -> Iris:
     iris = Iris.model_validate({k: v for k, v in table.items() if k in Iris.model_fields}, strict=True)
     if iris.mask is None:
         return iris
-    found: Iris = iris.replace(mask=str(((folder or Path()) / iris.mask).absolute()))
-    return found
+    return iris.replace(mask=str(((folder or Path()) / iris.mask).absolute()))
 
 
 def _rows(
@@ -273,25 +262,19 @@ def _stop(entry: dict[str, Any], k: int, problems: list[str]) -> Stop | None:
         if key in SURFACE_KEYS and key not in STOP_KEYS:
             why = "its opening follows from f_number" if key.startswith("semi_diameter") else "it refracts nothing"
             problems.append(f"row {k}: the stop has no {key}, {why}: remove it")
-    _unknown_keys(entry, (*STOP_KEYS, *SURFACE_KEYS), f"row {k}: ", problems)
-    thickness = _number(entry.get("thickness", 0.0), f"row {k}: thickness", ROW_NUMBERS["thickness"], problems)
+    unknown_keys(entry, (*STOP_KEYS, *SURFACE_KEYS), f"row {k}: ", problems)
+    thickness = ROW_NUMBERS["thickness"].read(entry.get("thickness", 0.0), f"row {k}: thickness", problems)
     return Stop(thickness=thickness) if len(problems) == before and thickness is not None else None
 
 
 def _surface(
-    entry: dict[str, Any],
-    k: int,
-    problems: list[str],
-    findings: list[tuple[int, media.Finding]],
-    folder: Path | None,
+    entry: dict[str, Any], k: int, problems: list[str], findings: list[tuple[int, media.Finding]], folder: Path | None
 ) -> Surface | None:
     before = len(problems)
-    _unknown_keys(entry, ("stop", *SURFACE_KEYS), f"row {k}: ", problems)
+    unknown_keys(entry, ("stop", *SURFACE_KEYS), f"row {k}: ", problems)
     values: dict[str, Any] = {"curvature": _curvature(entry, k, problems)}
     numbers = {
-        key: _number(entry[key], f"row {k}: {key}", field, problems)
-        for key, field in ROW_NUMBERS.items()
-        if key in entry
+        key: field.read(entry[key], f"row {k}: {key}", problems) for key, field in ROW_NUMBERS.items() if key in entry
     }
     estimated = entry.get("semi_diameter_estimated", False)
     if not isinstance(estimated, bool):
@@ -340,7 +323,7 @@ def _curvature(entry: dict[str, Any], k: int, problems: list[str], axis: str = "
     if radius in entry and curvature in entry:
         problems.append(f"row {k}: {radius} and {curvature} are both given: keep one")
     elif curvature in entry:
-        return _number(entry[curvature], f"row {k}: {curvature}", CURVATURE, problems) or 0.0
+        return CURVATURE.read(entry[curvature], f"row {k}: {curvature}", problems) or 0.0
     elif radius not in entry:
         problems.append(f'row {k}: radius is missing: give it in mm, or radius = "flat"')
     else:
@@ -355,7 +338,7 @@ def _curvature_of(radius: object, key: str, k: int, problems: list[str]) -> floa
         problems.append(f'row {k}: {key} is {shorten(radius)}, a number in mm or "flat" was expected')
     elif radius in (0, float("inf"), float("-inf")) and not isinstance(radius, bool):
         problems.append(f'row {k}: {key} is {shorten(radius)}: for a plane surface write {key} = "flat"')
-    elif (value := _number(radius, f"row {k}: {key}", RADIUS, problems)) is not None:
+    elif (value := RADIUS.read(radius, f"row {k}: {key}", problems)) is not None:
         if abs(1.0 / value) <= CURVATURE.high:
             return 1.0 / value
         problems.append(f"row {k}: {key} is {shorten(radius)}: less than a micrometre is no lens surface")
@@ -387,17 +370,3 @@ def _presets(table: object, row_count: int, problems: list[str]) -> dict[str, tu
             )
         presets[name] = tuple(_coating(entry, f"{where}, row {k}", problems) for k, entry in enumerate(entries))
     return presets
-
-
-def _number(value: object, where: str, field: NumberField, problems: list[str]) -> float | None:
-    refusal = field.refuse(value)
-    if refusal is None:
-        return float(value)  # type: ignore[arg-type]
-    problems.append(f"{where} {refusal}")
-    return None
-
-
-def _unknown_keys(table: dict[str, Any], known: tuple[str, ...], where: str, problems: list[str]) -> None:
-    problems += [
-        f"{where}{shorten(key)} is not a known key{did_you_mean(key, known)}" for key in table if key not in known
-    ]

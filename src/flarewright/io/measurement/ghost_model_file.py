@@ -32,10 +32,7 @@ def _read(path: str | Path, what: str, record: type[Record], largest: int = LARG
     data = read_json(path, what, largest)
     if not isinstance(data, dict):
         raise FlarewrightError(f"{path} is not {what}: a JSON object was expected")
-    try:
-        check_version(data, _NEWEST, str(path))
-    except ValueError as error:
-        raise FlarewrightError(str(error)) from None
+    check_version(data, _NEWEST, str(path))
     found, problems = record_of(record.model_validate, data)
     if found is None:
         raise FlarewrightError(summary(str(path), problems), tuple(problems))

@@ -8,5 +8,5 @@
 - `project_file`: `read_project`, `project_from_data`, `project_json_schema`
 - `project_text`: `project_text`, projects as TOML
 - `scene_file`: `read_scene`, `scene_from_data`, `scene_json_schema`
-- `spectrum_text`: `parse_spectrum`, `spectrum_text`, `read_spectrum_csv`
+- `spectrum_text`: `parse_spectrum`, `spectrum_text`
 """

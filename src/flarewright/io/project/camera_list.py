@@ -13,8 +13,6 @@ from ...errors import ProjectError
 from ...model.base import Frozen
 from ..files.text_file import read_toml
 
-__all__ = ["CameraFormat", "camera_format", "camera_formats", "is_camera_name"]
-
 
 class CameraFormat(Frozen):
     """The active area of a camera.

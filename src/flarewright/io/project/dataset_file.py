@@ -9,7 +9,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from ...errors import FlarewrightError, ProjectError
+from ...errors import FlarewrightError, ProjectError, raised_as
 from ...model.project import dataset as records
 from ...model.project import distribution as distributions
 from ...model.project.dataset import DatasetSpec
@@ -18,7 +18,7 @@ from ..files.text_file import check_version
 from ..files.type_slips import record_of
 from ..lens.coating_text import parse_coating_choice
 from .file_of_kind import read_file_of_kind
-from .project_file import ProjectFileError, Sections, lens_location, validation_messages
+from .project_file import Sections, lens_location, validation_messages
 
 _NEWEST = 1
 
@@ -138,10 +138,8 @@ def read_dataset_spec(path: str | os.PathLike[str]) -> DatasetSpec:
 
 def dataset_from_data(data: dict[str, Any], *, folder: Path, where: str) -> DatasetSpec:
     """Return the specification of parsed TOML; parameters and errors as `project_file.project_from_data`."""
-    try:
+    with raised_as(ProjectError):
         check_version(data, _NEWEST, f"the specification {where}")
-    except ValueError as error:
-        raise ProjectError(str(error)) from None
     out = dict(data)
     table = out.get("background")
     if isinstance(table, dict) and isinstance(table.get("folder"), str):
@@ -153,7 +151,7 @@ def dataset_from_data(data: dict[str, Any], *, folder: Path, where: str) -> Data
         problems += _text_problems(spec, folder)
         problems += [*contradictions(spec), *_idle(spec)]
     if spec is None or problems:
-        raise ProjectFileError(summary(where, problems), tuple(problems))
+        raise ProjectError(summary(where, problems), tuple(problems))
     return _resolved(spec, folder)
 
 
@@ -170,8 +168,7 @@ def _resolved(spec: DatasetSpec, folder: Path) -> DatasetSpec:
     coating = spec.lens.coating.replace(choice=tuple(map(file, spec.lens.coating.choice)))
     splits = {name: place(part) for name, part in spec.splits if isinstance(part, tuple)}
     lens = spec.lens.replace(names=names, coating=coating)
-    found: DatasetSpec = spec.replace(lens=lens, splits=spec.splits.replace(**splits))
-    return found
+    return spec.replace(lens=lens, splits=spec.splits.replace(**splits))
 
 
 def _text_problems(spec: DatasetSpec, folder: Path) -> list[str]:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ...errors import ProjectError
+from ...errors import ProjectError, raised_as
 from ..files.file_kind import Kind, refuse_lens_suffix, refuse_other_kind
 from ..files.text_file import read_toml
-
-__all__ = ["read_file_of_kind"]
 
 
 def read_file_of_kind(path: Path, kind: Kind, what: str) -> dict[str, Any]:
@@ -31,10 +29,8 @@ def read_file_of_kind(path: Path, kind: Kind, what: str) -> dict[str, Any]:
     ProjectError
         The file cannot be read, or is clearly of another kind.
     """
-    try:
+    with raised_as(ProjectError):
         refuse_lens_suffix(path, kind)
         data = read_toml(path, what)
         refuse_other_kind(path, data, kind)
-    except ValueError as error:
-        raise ProjectError(str(error)) from None
     return data

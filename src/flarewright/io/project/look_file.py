@@ -11,21 +11,19 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ...errors import ProjectError
+from ...errors import ProjectError, raised_as
 from ...model import Iris, Look
 from ...model.project.look import CAMERA_KEYS, LIGHT_KEYS, LOOK_SECTIONS
 from ..files.door import expanded
 from ..files.file_kind import refuse_other_kind
 from ..files.sentences import did_you_mean, summary, validation_sentences
 from ..files.text_file import check_version, read_toml
-from .project_file import ProjectFileError, project_from_data
+from .project_file import project_from_data
 from .project_text import project_data, toml_text
 
 _NEWEST = 1
 _EXAMPLE_KEYS = ("schema_version", "name", "notes", "lens", "zoom")
 """Keys of a look file that do not belong to the look: its texts, and the lens of its example."""
-
-__all__ = ["look_path", "look_text", "read_look", "shipped_looks"]
 
 
 @cache
@@ -83,12 +81,10 @@ def read_look(name_or_path: str | os.PathLike[str]) -> Look:
         When the look does not exist or its file has errors; `problems` then lists all of them.
     """
     path = look_path(Path(name_or_path) if not isinstance(name_or_path, str) else name_or_path)
-    try:
+    with raised_as(ProjectError):
         data = read_toml(path, "a look")
         refuse_other_kind(path, data, "look")
         check_version(data, _NEWEST, f"the look {path}")
-    except ValueError as error:
-        raise ProjectError(str(error)) from None
     known = (*_EXAMPLE_KEYS, *LOOK_SECTIONS)
     problems = [
         f"a look has no key {key}{did_you_mean(key, known)}: known are {', '.join(LOOK_SECTIONS)}"
@@ -102,7 +98,7 @@ def read_look(name_or_path: str | os.PathLike[str]) -> Look:
         if key not in keys
     ]
     if problems:
-        raise ProjectFileError(summary(str(path), problems), tuple(problems))
+        raise ProjectError(summary(str(path), problems), tuple(problems))
     if not any(key in LOOK_SECTIONS for key in data):
         raise ProjectError(f"{path} sets no key of a look; known are {', '.join(LOOK_SECTIONS)}")
     stage = {key: value for key, value in data.items() if key not in ("name", "notes")}
@@ -112,7 +108,7 @@ def read_look(name_or_path: str | os.PathLike[str]) -> Look:
         return Look(name=name, notes=notes, example=example, says=_look_keys(data))
     except ValidationError as error:
         found = tuple(validation_sentences(error))
-        raise ProjectFileError(summary(str(path), list(found)), found) from None
+        raise ProjectError(summary(str(path), list(found)), found) from None
 
 
 def look_text(look: Look, folder: Path | None = None) -> str:

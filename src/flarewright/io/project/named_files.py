@@ -10,8 +10,6 @@ from ...model import Lens, Project
 # fields of the model that name files of pictures (tests/editor/session/test_reach.py)
 FIELDS = ("image", "depth", "mask")
 
-__all__ = ["FIELDS", "picture_files"]
-
 
 def picture_files(model: Project | Lens) -> tuple[str, ...]:
     """Return the paths of all pictures that a project or a lens names; a lens that a project names is not opened."""

@@ -21,7 +21,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from ...errors import FlarewrightError, LensError, ProjectError
+from ...errors import FlarewrightError, LensError, ProjectError, raised_as
 from ...model.lens import coating as coatings
 from ...model.lens import scatter as scatters
 from ...model.lens.imperfection import Imperfection
@@ -49,7 +49,6 @@ from .project_text import ABOUT, FILES, HOLDOUT_FILES, lens_location, project_te
 from .spectrum_text import parse_spectrum
 
 __all__ = [
-    "ProjectFileError",
     "Sections",
     "accept_text",
     "expand_coating",
@@ -65,22 +64,6 @@ __all__ = [
 Sections = dict[str, tuple[type[BaseModel], ...]]
 
 _NEWEST = 1
-
-
-class ProjectFileError(ProjectError):
-    """Errors of a project file.
-
-    Parameters
-    ----------
-    message : str
-        One sentence.
-    problems : tuple of str
-        All errors, one sentence each.
-    """
-
-    def __init__(self, message: str, problems: tuple[str, ...] = ()) -> None:
-        super().__init__(message)
-        self.problems = problems
 
 
 def read_project(path: str | os.PathLike[str]) -> Project:
@@ -103,10 +86,8 @@ def read_project(path: str | os.PathLike[str]) -> Project:
     """
     path = Path(path)
     data = read_file_of_kind(path, "project", "a project file")
-    try:
+    with raised_as(ProjectError):
         check_version(data, _NEWEST, f"the project file {path}")
-    except ValueError as error:
-        raise ProjectError(str(error)) from None
     return project_from_data(data, folder=path.parent, where=str(path))
 
 
@@ -137,7 +118,7 @@ def project_from_data(data: dict[str, Any], *, folder: Path, where: str) -> Proj
     problems += wrong
     if project is not None and not problems:
         return project
-    raise ProjectFileError(summary(where, problems), tuple(problems))
+    raise ProjectError(summary(where, problems), tuple(problems))
 
 
 def _expanded(data: dict[str, Any], folder: Path, problems: list[str]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from ...errors import FlarewrightError, ProjectError
+from ...errors import FlarewrightError, ProjectError, raised_as
 from ...model.project import light as spectra
 from ...model.project import project as choices
 from ...model.project import scene as records
@@ -19,15 +19,7 @@ from ..files.sentences import shorten, summary
 from ..files.text_file import check_version
 from ..files.type_slips import record_of
 from .file_of_kind import read_file_of_kind
-from .project_file import (
-    ProjectFileError,
-    Sections,
-    accept_text,
-    expand_coating,
-    expand_light,
-    lens_location,
-    validation_messages,
-)
+from .project_file import Sections, accept_text, expand_coating, expand_light, lens_location, validation_messages
 from .project_text import ABOUT
 
 _NEWEST = 1
@@ -121,10 +113,8 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
 
 def scene_from_data(data: dict[str, Any], *, folder: Path, where: str) -> Scene:
     """Return the scene of parsed TOML; parameters and errors as `project_file.project_from_data`."""
-    try:
+    with raised_as(ProjectError):
         check_version(data, _NEWEST, f"the scene file {where}")
-    except ValueError as error:
-        raise ProjectError(str(error)) from None
     problems: list[str] = []
     out = dict(data)
     if isinstance(out.get("cameras"), list):
@@ -134,7 +124,7 @@ def scene_from_data(data: dict[str, Any], *, folder: Path, where: str) -> Scene:
     scene, wrong = record_of(Scene.model_validate, out, lambda error: validation_messages(error, out, _SECTIONS))
     problems += wrong
     if scene is None or problems:
-        raise ProjectFileError(summary(where, problems), tuple(problems))
+        raise ProjectError(summary(where, problems), tuple(problems))
     return scene
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from ...errors import ProjectError
+from ...errors import ProjectError, raised_as
 from ...model.project.light import D65, BlackBody, EqualEnergy, Lines, Rgb, Spectrum, Tabulated
 from ..files.text_file import read_text
 
@@ -47,7 +47,7 @@ def parse_spectrum(text: str, *, folder: Path | None = None) -> Spectrum:
     word, _, rest = text.strip().partition(":")
     word = word.strip().lower()
     if word.endswith((".csv", ".txt", ".tsv")) or text.strip().lower().endswith((".csv", ".txt", ".tsv")):
-        return read_spectrum_csv((folder or Path()) / text.strip())
+        return _read_table((folder or Path()) / text.strip())
     if word == "d65" and not rest:
         return D65()
     if word == "equal-energy" and not rest:
@@ -85,28 +85,10 @@ def spectrum_text(spectrum: Spectrum) -> str | None:
     return None
 
 
-def read_spectrum_csv(path: Path) -> Tabulated:
-    """Read a table of two columns: wavelength in nm, relative power.
-
-    Parameters
-    ----------
-    path : path
-        Columns separated by comma, semicolon, tab or blanks; empty lines, lines that start with # and one header line
-        are skipped.
-
-    Returns
-    -------
-    Tabulated
-
-    Raises
-    ------
-    ProjectError
-        When the file cannot be read, a line is not two numbers, or the wavelengths do not rise.
-    """
-    try:
+def _read_table(path: Path) -> Tabulated:
+    """Read two columns, wavelength in nm and relative power; empty lines, # and one header line are skipped."""
+    with raised_as(ProjectError):
         lines = read_text(path, "a spectrum table").splitlines()
-    except ValueError as error:
-        raise ProjectError(str(error)) from None
     pairs: list[tuple[float, float]] = []
     headline_seen = False
     for number, line in enumerate(lines, 1):

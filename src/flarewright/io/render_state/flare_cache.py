@@ -20,8 +20,6 @@ from ..files.door import outside
 
 Pictures = dict[str, dict[tuple[float, float], Pixels]]
 
-__all__ = ["read_cache", "write_cache"]
-
 # a picture's name within the archive, by which a damaged file of ours is recognised
 _NAME = re.compile(rb"/-?\d[^/]{0,30}/-?\d[^/]{0,30}\.npy")
 

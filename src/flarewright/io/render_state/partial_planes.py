@@ -15,8 +15,6 @@ from ..files.door import outside_arrays
 
 Planes = list[Pixels | Floats | None]
 
-__all__ = ["Planes", "digest_in", "read_planes", "write_planes"]
-
 _WHAT, _REMEDY = "part of a picture", "it is drawn again"
 
 

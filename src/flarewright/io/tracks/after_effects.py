@@ -12,8 +12,6 @@ from ..files.door import shown
 from .numbers import MOST_TRACKS, number, track_of
 from .track import Track, TrackFile
 
-__all__ = ["is_after_effects", "read_after_effects"]
-
 _FIRST = "adobe after effects"
 # of a track point: the place that the tracker applies, then the one that it follows
 _POINTS = ("Attach Point", "Feature Center")

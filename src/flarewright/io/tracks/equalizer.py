@@ -11,8 +11,6 @@ from ..files.door import shown
 from .numbers import MOST_FRAMES, MOST_TRACKS, number, track_of, whole
 from .track import TrackFile
 
-__all__ = ["is_equalizer", "read_equalizer"]
-
 
 def is_equalizer(text: str) -> bool:
     """Return whether a text starts with a number of points, a name, a colour and a number of frames."""

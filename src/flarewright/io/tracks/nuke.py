@@ -19,8 +19,6 @@ from ..files.door import shown
 from .numbers import MOST_FRAMES, MOST_TRACKS, number, track_of
 from .track import Track, TrackFile
 
-__all__ = ["is_columns", "is_nuke", "read_columns", "read_nuke"]
-
 _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[{}]|[^\s{}"]+|"')
 _NODE = re.compile(r"^\s*(?:Tracker[34]?|Root)\s*\{", re.MULTILINE)
 _FORMAT = re.compile(r"""^\s*format\s+"(\d+)\s+(\d+)\s""", re.MULTILINE)

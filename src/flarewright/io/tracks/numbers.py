@@ -11,8 +11,6 @@ from ...errors import FileError
 from ...typing import Floats
 from .track import Origin, Track
 
-__all__ = ["LARGEST_BYTES", "MOST_FRAMES", "MOST_TRACKS", "number", "track_of", "whole"]
-
 LARGEST_BYTES = 64_000_000
 """Largest size of a track file, bytes: whole Nuke scripts hold tracks."""
 MOST_FRAMES = 10_000

@@ -18,8 +18,6 @@ from .syntheyes import is_syntheyes, read_syntheyes
 from .table import is_table, read_table
 from .track import Origin, TrackFile
 
-__all__ = ["FORMATS", "TrackFormat", "read_tracks", "track_format"]
-
 TrackFormat = Literal["csv", "nuke", "nuke-ascii", "after-effects", "syntheyes", "3de", "blender", "usd"]
 FORMATS: tuple[TrackFormat, ...] = get_args(TrackFormat)
 
@@ -43,11 +41,7 @@ def track_format(text: str) -> TrackFormat:
 
 
 def read_tracks(
-    path: str | Path,
-    form: TrackFormat | None = None,
-    *,
-    origin: Origin | None = None,
-    first_frame: int = 1,
+    path: str | Path, form: TrackFormat | None = None, *, origin: Origin | None = None, first_frame: int = 1
 ) -> TrackFile:
     r"""Read the tracks of a file.
 

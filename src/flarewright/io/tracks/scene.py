@@ -14,8 +14,6 @@ from ...model.project.light import LEAST_LIGHT_DEG
 from ...typing import Floats
 from .track import Track
 
-__all__ = ["CameraFrame", "LightFrame", "SceneLight", "tracks_of_scene"]
-
 
 @dataclass(frozen=True, eq=False)
 class CameraFrame:

@@ -18,8 +18,6 @@ from .numbers import MOST_FRAMES, MOST_TRACKS
 from .scene import CameraFrame, LightFrame, SceneLight, tracks_of_scene
 from .track import TrackFile
 
-__all__ = ["is_scene", "read_scene"]
-
 FORMAT = "flarewright-scene"
 
 Row = tuple[float, float, float, float]

@@ -13,8 +13,6 @@ from ..files.door import shown
 from .numbers import MOST_TRACKS, number, track_of
 from .track import TrackFile
 
-__all__ = ["is_syntheyes", "read_syntheyes"]
-
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _LINE = re.compile(rf"^\s*(?P<name>\S.*?)\s+(?P<frame>-?\d+)\s+(?P<u>{_NUMBER})\s+(?P<v>{_NUMBER})(?:\s+\d+)?\s*$")
 # trackers leave the picture, but not by more than this

@@ -16,8 +16,6 @@ from ..files.door import shown
 from .numbers import MOST_TRACKS, number, track_of
 from .track import Origin, TrackFile
 
-__all__ = ["is_table", "read_table"]
-
 _ALIASES = {
     "red": "r", "green": "g", "blue": "b", "track": "name", "light": "name", "frames": "frame", "x_px": "x",
     "y_px": "y",

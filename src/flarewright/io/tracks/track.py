@@ -12,8 +12,6 @@ from ...typing import Floats, Mask
 Origin = Literal["top-left", "bottom-left"]
 """The corner of the picture from which pixels count. The centre of its pixel is (0.5, 0.5)."""
 
-__all__ = ["Origin", "Track", "TrackFile"]
-
 
 @dataclass(frozen=True, eq=False)
 class Track:

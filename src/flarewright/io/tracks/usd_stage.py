@@ -15,8 +15,6 @@ from .numbers import LARGEST_BYTES, MOST_FRAMES, MOST_TRACKS
 from .scene import CameraFrame, LightFrame, SceneLight, tracks_of_scene
 from .track import TrackFile
 
-__all__ = ["read_stage"]
-
 _WHAT = "a USD stage"
 # lights without a place in the picture, such as a dome around it
 _PLACELESS = frozenset({"DomeLight", "DomeLight_1", "GeometryLight", "PortalLight", "PluginLight"})

@@ -8,8 +8,6 @@ from typing import Any
 from ...errors import FlarewrightError
 from .worker_side import Facts
 
-__all__ = ["check_threads", "differences", "refuse_other_versions"]
-
 # workers that a sentence names
 _NAMED = 3
 # answers of a worker without this module, as Dask words them: it has no Flarewright, or an older one

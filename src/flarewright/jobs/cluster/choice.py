@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from ...errors import ProjectError
 
-__all__ = ["MOST_WORKERS", "LocalChoice", "RunningChoice", "SlurmChoice", "parse_cluster"]
-
 MOST_WORKERS = 1024
 """Largest number of worker processes on this machine."""
 

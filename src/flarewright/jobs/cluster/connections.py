@@ -20,8 +20,6 @@ from .local_workers import LocalWorkers
 from .slurm_file import SlurmSettings
 from .worker_side import LocalWorker
 
-__all__ = ["Connection", "LocalConnection", "RunningConnection", "SlurmConnection", "connect"]
-
 # time for a scheduler to answer, for the first worker of a running cluster, and without any worker later
 _ANSWER_S, _FIRST_WORKER_S, _NO_WORKER_S = 5.0, 20.0, 300.0
 # time for SLURM to judge a job

@@ -26,8 +26,6 @@ from .quiet import quiet
 from .slurm_file import read_slurm_settings
 from .worker_side import Order, facts, missing_place, work
 
-__all__ = ["Cluster", "open_cluster"]
-
 # items that are submitted ahead, of all and for each worker: a queue that never runs dry, in flat memory
 _AHEAD, _AHEAD_OF_WORKER = 256, 3
 # seconds between two looks at the workers

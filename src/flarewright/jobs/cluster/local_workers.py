@@ -12,8 +12,6 @@ from ...errors import FlarewrightError
 from ..processes import end_processes, how_it_ended, start_process
 from .worker_side import LocalWorker
 
-__all__ = ["LocalWorkers"]
-
 # worker processes in a row that may end without a finished item
 _MOST_LOST = 8
 

@@ -9,8 +9,6 @@ from contextlib import contextmanager
 
 from ...errors import optional
 
-__all__ = ["quiet"]
-
 # loggers of Dask, of which each writes to stderr
 _LOGGERS = ("distributed", "distributed.client", "distributed.gc", "tornado", "tornado.application", "bokeh", "asyncio")
 

@@ -9,13 +9,11 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from ...errors import ProjectError
+from ...errors import ProjectError, raised_as
 from ...io.files.sentences import summary
 from ...io.files.text_file import read_toml
 from ...io.files.type_slips import record_of
 from ...model.base import Frozen
-
-__all__ = ["SlurmSettings", "read_slurm_settings"]
 
 # SLURM's own forms: 90, 1:30:00, 2-12:00:00
 _WALLTIME = re.compile(r"(\d{1,4}-)?\d{1,4}(:\d{1,2}){0,2}", re.ASCII)
@@ -111,10 +109,8 @@ def read_slurm_settings(path: str | os.PathLike[str]) -> SlurmSettings:
     >>> read_slurm_settings("farm.toml").jobs                                           # doctest: +SKIP
     10
     """
-    try:
+    with raised_as(ProjectError):
         data = read_toml(Path(path), "a file of SLURM settings")
-    except ValueError as error:
-        raise ProjectError(str(error)) from None
     settings, problems = record_of(SlurmSettings.model_validate, data)
     if settings is None:
         raise ProjectError(summary(str(path), problems), tuple(problems))

@@ -18,8 +18,6 @@ from ..._version import __version__
 from ..worker import WRITING, attempt, named
 from .quiet import quiet
 
-__all__ = ["Facts", "LocalWorker", "Order", "facts", "serve", "work"]
-
 # packages whose version can change the bytes of a file
 _COMPARED = ("numpy", "numba", "llvmlite", "scipy", "OpenEXR", "pillow", "av", "rawpy", "tifffile")
 # the working folder belongs to the process: one item at a time, whatever the number of threads

@@ -121,14 +121,7 @@ def _turned(cumulative, turns):
 
 @compiled
 def blend_fan_wings(
-    x: Floats,
-    y: Floats,
-    pixel: Floats,
-    cumulative: Floats,
-    colour: Floats,
-    inner: float,
-    outer: float,
-    out: Picture,
+    x: Floats, y: Floats, pixel: Floats, cumulative: Floats, colour: Floats, inner: float, outer: float, out: Picture
 ) -> None:
     """Cross-fade from the core to the wings g(phi) colour / r^3; g is averaged over the angle that a pixel subtends.
 

@@ -244,10 +244,7 @@ def _snap_corners(discs, spokes, blades, turn, active, middle, points, by):
 @borrowing
 def picture_step(frame, along, across):
     """Return a step along s and across it as columns and rows of the picture, with rows down."""
-    return (
-        frame[4] * (frame[2] * along - frame[3] * across),
-        -frame[4] * (frame[3] * along + frame[2] * across),
-    )
+    return (frame[4] * (frame[2] * along - frame[3] * across), -frame[4] * (frame[3] * along + frame[2] * across))
 
 
 @borrowing

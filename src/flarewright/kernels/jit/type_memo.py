@@ -121,8 +121,7 @@ def _rec_list_vars(self: Any, val: Any) -> list[Any]:
     if kind == "variable":
         return [val]
     if kind == "statement":
-        inside: list[Any] = val.list_vars()
-        return inside
+        return val.list_vars()
     found: list[Any] = []
     if kind != "nothing":
         for part in val.values() if kind == "named parts" else val:

@@ -215,9 +215,9 @@ def _sags(shapes, row, alive, work):
         if shapes[row, ASPHERE + k] != 0.0:
             terms = k + 1
     if terms > 0:
-        _aspheres(shapes, row, terms, work)
+        _aspheres(shapes, row, ASPHERE, terms, False, work)
     if shapes[row, ODD_COUNT] > 0.0:
-        _odd_aspheres(shapes, row, work)
+        _aspheres(shapes, row, ODD, int(shapes[row, ODD_COUNT]), True, work)
     if shapes[row, DEGREE] >= 0.0 or shapes[row, SIDE] > 0.0:
         _figures(shapes, row, alive, work)
 
@@ -251,42 +251,22 @@ def _figures(shapes, row, alive, work):
 
 
 @inlined
-def _aspheres(shapes, row, terms, work):
-    """Add the even aspheres of all lanes (`kernels.tracing.intersect`); x and y are in AT_X and AT_Y."""
+def _aspheres(shapes, row, first, terms, odd, work):
+    """Add the aspheres of all lanes (`kernels.tracing.intersect`); x and y are in AT_X and AT_Y."""
     tangent = shapes[row, TANGENT]
     for m in range(LANES):
         work[ONE, m], work[TWO, m] = 0.0, 0.0
         work[THREE, m] = min(work[AT_X, m] * work[AT_X, m] + work[AT_Y, m] * work[AT_Y, m], tangent)
-    for k in range(terms - 1, -1, -1):
-        term = shapes[row, ASPHERE + k]
+    for k in range(first + terms - 1, first - 1, -1):
+        term = shapes[row, k]
         for m in range(LANES):
             work[TWO, m] = work[TWO, m] * work[THREE, m] + work[ONE, m]
             work[ONE, m] = work[ONE, m] * work[THREE, m] + term
     for m in range(LANES):
         x, y, at = work[AT_X, m], work[AT_Y, m], work[THREE, m]
-        slope = at * (2.0 * work[ONE, m] + at * work[TWO, m])
-        work[SAGS, m] += at * at * work[ONE, m] + (x * x + y * y - at) * slope
-        work[GX, m] += 2.0 * x * slope
-        work[GY, m] += 2.0 * y * slope
-
-
-@inlined
-def _odd_aspheres(shapes, row, work):
-    """Add the odd aspheres of all lanes (`kernels.tracing.intersect`); x and y are in AT_X and AT_Y."""
-    tangent = shapes[row, TANGENT]
-    for m in range(LANES):
-        work[ONE, m], work[TWO, m] = 0.0, 0.0
-        work[THREE, m] = min(work[AT_X, m] * work[AT_X, m] + work[AT_Y, m] * work[AT_Y, m], tangent)
-    for k in range(int(shapes[row, ODD_COUNT]) - 1, -1, -1):
-        term = shapes[row, ODD + k]
-        for m in range(LANES):
-            work[TWO, m] = work[TWO, m] * work[THREE, m] + work[ONE, m]
-            work[ONE, m] = work[ONE, m] * work[THREE, m] + term
-    for m in range(LANES):
-        x, y, at = work[AT_X, m], work[AT_Y, m], work[THREE, m]
-        root = sqrt(at)
-        slope = root * (1.5 * work[ONE, m] + at * work[TWO, m])
-        work[SAGS, m] += root * at * work[ONE, m] + (x * x + y * y - at) * slope
+        part, power = (sqrt(at), 1.5) if odd else (at, 2.0)
+        slope = part * (power * work[ONE, m] + at * work[TWO, m])
+        work[SAGS, m] += part * at * work[ONE, m] + (x * x + y * y - at) * slope
         work[GX, m] += 2.0 * x * slope
         work[GY, m] += 2.0 * y * slope
 

@@ -107,39 +107,22 @@ def intersect_sphere(curvature, radius, x, y, z, dx, dy, dz, heading):
 
 
 @inner
-def _asphere(shapes, row, x, y):
-    """Return the even asphere's sum A4 r^4 + A6 r^6 + ... and its gradient.
+def _asphere(shapes, row, first, terms, odd, x, y):
+    """Return an asphere's sum A4 r^4 + A6 r^6 + ..., or the odd A3 r^3 + A5 r^5 + ..., and its gradient.
 
     Beyond TANGENT, outside the rim, the sum continues as its tangent: rays there are blocked but still traced, and high
-    powers would diverge.
+    powers would diverge. The odd sum is smooth on the axis.
     """
     r2 = x * x + y * y
     at = min(r2, shapes[row, TANGENT])
     value, slope = 0.0, 0.0
-    for k in range(TERMS - 1, -1, -1):
+    for k in range(first + terms - 1, first - 1, -1):
         slope = slope * at + value
-        value = value * at + shapes[row, ASPHERE + k]
-    # value and slope are those of A4 + A6 q + ... in q = r^2; the sum is q^2 times that
-    slope = at * (2.0 * value + at * slope)
-    value = at * at * value + (r2 - at) * slope
-    return value, 2.0 * x * slope, 2.0 * y * slope
-
-
-@inner
-def _odd_asphere(shapes, row, x, y):
-    """Return the odd asphere's sum A3 r^3 + A5 r^5 + ... and its gradient; beyond TANGENT as `_asphere` does.
-
-    It is r^3 times a polynomial in q = r^2, with the slope r (1.5 value + q slope) in q: smooth on the axis.
-    """
-    r2 = x * x + y * y
-    at = min(r2, shapes[row, TANGENT])
-    root = sqrt(at)
-    value, slope = 0.0, 0.0
-    for k in range(int(shapes[row, ODD_COUNT]) - 1, -1, -1):
-        slope = slope * at + value
-        value = value * at + shapes[row, ODD + k]
-    slope = root * (1.5 * value + at * slope)
-    value = root * at * value + (r2 - at) * slope
+        value = value * at + shapes[row, k]
+    # value and slope are those of A4 + A6 q + ... in q = r^2; the sum is q^2 times that, or q^1.5 times
+    part, power = (sqrt(at), 1.5) if odd else (at, 2.0)
+    slope = part * (power * value + at * slope)
+    value = part * at * value + (r2 - at) * slope
     return value, 2.0 * x * slope, 2.0 * y * slope
 
 
@@ -233,10 +216,10 @@ def sag_of_shape(shapes, row, x, y):
     # d(1 / (1 + root)) = below^2 (q x / root) dx
     bend = whole * below * below / root
     slope_x, slope_y = 2.0 * cx * x * below + bend * qx * x, 2.0 * cy * y * below + bend * qy * y
-    value, along_x, along_y = _asphere(shapes, row, x, y)
+    value, along_x, along_y = _asphere(shapes, row, ASPHERE, TERMS, False, x, y)
     sag, slope_x, slope_y = sag + value, slope_x + along_x, slope_y + along_y
     if shapes[row, ODD_COUNT] > 0.0:
-        value, along_x, along_y = _odd_asphere(shapes, row, x, y)
+        value, along_x, along_y = _asphere(shapes, row, ODD, int(shapes[row, ODD_COUNT]), True, x, y)
         sag, slope_x, slope_y = sag + value, slope_x + along_x, slope_y + along_y
     if shapes[row, DEGREE] >= 0.0:
         value, along_x, along_y = _polynomial(shapes, row, x, y)

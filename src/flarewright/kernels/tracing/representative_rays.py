@@ -80,7 +80,7 @@ def seen_rays(rays, iris_radius, blades, axes, place, width, height):
 
 
 @compiled
-def choose_representatives(pupil, triangles, passing, step, count):
+def choose_representatives(pupil, triangles, passing, count):
     """Choose nodes of a bundle, spread evenly over the area of the pupil that passes.
 
     Parameters
@@ -88,8 +88,6 @@ def choose_representatives(pupil, triangles, passing, step, count):
     pupil : ndarray, shape (N, 2)
     triangles : ndarray, shape (T, 3), int64
     passing : ndarray, shape (N,), bool
-    step : int
-        Use every step-th triangle.
     count : int
         Number of nodes to choose.
 
@@ -98,10 +96,10 @@ def choose_representatives(pupil, triangles, passing, step, count):
     ndarray, int64
         `count` nodes; empty if no node passes.
     """
-    reached = np.empty(3 * ((triangles.shape[0] + step - 1) // step))
+    reached = np.empty(3 * triangles.shape[0])
     total = 0.0
     corner = 0
-    for t in range(0, triangles.shape[0], step):
+    for t in range(triangles.shape[0]):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         x1, y1 = pupil[b, 0] - pupil[a, 0], pupil[b, 1] - pupil[a, 1]
         x2, y2 = pupil[c, 0] - pupil[a, 0], pupil[c, 1] - pupil[a, 1]
@@ -117,7 +115,7 @@ def choose_representatives(pupil, triangles, passing, step, count):
         share = (k + 0.5) / count * total
         while corner + 1 < reached.size and reached[corner] < share:
             corner += 1
-        chosen[k] = triangles[corner // 3 * step, corner % 3]
+        chosen[k] = triangles[corner // 3, corner % 3]
     return chosen
 
 

@@ -98,8 +98,7 @@ def compact_model(
     )  # fmt: skip
     unseen = [ghost.name for ghost in model.ghosts if ghost.name not in tracked]
     remarks = (*model.remarks, f"dropped, as no frame shows them: {', '.join(unseen)}") if unseen else model.remarks
-    out: GhostModel = model.replace(ghosts=ghosts, remarks=remarks)
-    return out
+    return model.replace(ghosts=ghosts, remarks=remarks)
 
 
 def drawn_range(ghost: AberrationGhost, track: GhostTrack) -> tuple[float, float]:
@@ -284,12 +283,11 @@ def _model_ghost(
         colours.append(channel_of(numbers, shape.discs, deviation))
     # keep the fade of the fit where its range is unchanged; elsewhere the brightness curve fades
     same = zip(span, ghost.visible_deg, ghost.fade_deg, strict=True)
-    out: AberrationGhost = ghost.replace(
+    return ghost.replace(
         red=colours[0], green=colours[1], blue=colours[2], curves=curves,
         visible_deg=(floor(1e4 * span[0]) / 1e4, ceil(1e4 * span[1]) / 1e4),
         fade_deg=tuple(fade if end == old else 0.0 for end, old, fade in same),
     )  # fmt: skip
-    return out
 
 
 def written_numbers(shape: Shape, held: Floats, settings: CompressionSettings = CompressionSettings()) -> Floats:

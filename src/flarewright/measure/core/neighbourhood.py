@@ -17,9 +17,9 @@ def brightest(pixels: NDArray[Any], far: int, axes: Sequence[int] = (0, 1)) -> N
     return _swept(np.maximum, pixels, far, axes)
 
 
-def darkest(pixels: NDArray[Any], far: int, axes: Sequence[int] = (0, 1)) -> NDArray[Any]:
+def darkest(pixels: NDArray[Any], far: int) -> NDArray[Any]:
     """Return the smallest value within a square, as `brightest` does the largest."""
-    return _swept(np.minimum, pixels, far, axes)
+    return _swept(np.minimum, pixels, far, (0, 1))
 
 
 def _swept(reduce: Callable[[Any, Any], Any], pixels: NDArray[Any], far: int, axes: Sequence[int]) -> NDArray[Any]:

@@ -61,8 +61,7 @@ def with_drift_gains(folder: Path, run: MergedRun, settings: DriftSettings = Dri
         f"the light drifted by {spread:.2%} (standard deviation) from frame to frame, which is corrected; changes "
         f"slower than over {settings.slow_deg:g} degrees are attributed to the lens"
     )
-    out: MergedRun = run.replace(frames=frames, remarks=(*run.remarks, reported))
-    return out
+    return run.replace(frames=frames, remarks=(*run.remarks, reported))
 
 
 def _gains_of(

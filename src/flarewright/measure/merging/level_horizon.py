@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import OutputError
+from ...io.files.atomic_write import make_folder
 from ...io.measurement.merged import read_frame, write_frame
 from ...model.measurement.capture import FrameInfo, MergedFrame, MergedRun
 from ...typing import Floats, Pixels, Progress
@@ -42,34 +42,20 @@ def make_upright(folder: Path, run: MergedRun, tell: Progress) -> MergedRun:
     Interpolation is bilinear, which lowers a pixel's variance and correlates neighbours. Search and fit do not need
     such frames: they use the tilt of each frame.
     """
-    try:
-        (folder / UPRIGHT).mkdir(exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot make the folder {folder / UPRIGHT}: {(error.strerror or '').lower()}") from None
+    make_folder(folder / UPRIGHT)
     infos = []
     for k, info in enumerate(run.frames):
-        frame = turned_upright(read_frame(folder, info))
+        frame = _turned_upright(read_frame(folder, info))
         here: FrameInfo = frame.info.replace(file=f"{UPRIGHT}/{Path(info.file).name}")
         write_frame(folder, MergedFrame(here, frame.radiance, frame.variance))
         infos.append(here)
         tell((k + 1) / len(run.frames), f"upright {k + 1} of {len(run.frames)}")
     reported = "frames were turned upright (--upright): neighbouring pixels share some of their noise"
-    out: MergedRun = run.replace(frames=tuple(infos), remarks=(*run.remarks, reported))
-    return out
+    return run.replace(frames=tuple(infos), remarks=(*run.remarks, reported))
 
 
-def turned_upright(frame: MergedFrame) -> MergedFrame:
-    """Rotate a frame about its axis by the tilt of its horizon.
-
-    Parameters
-    ----------
-    frame : MergedFrame
-
-    Returns
-    -------
-    MergedFrame
-        Its roll is the nominal one; pixels from beyond the border have infinite variance.
-    """
+def _turned_upright(frame: MergedFrame) -> MergedFrame:
+    """Rotate a frame about its axis by the tilt of its horizon; beyond the border the variance is infinite."""
     info = frame.info
     tilt = radians(info.horizon_deg)
     c, s = cos(tilt), sin(tilt)

@@ -40,10 +40,6 @@ class Noise:
     slope: float
     floor: float
 
-    def variance(self, units: NDArray[np.floating]) -> NDArray[np.floating]:
-        """Return the variance of values above black with mean `units`."""
-        return np.asarray(np.maximum(units, 0.0) * self.slope + self.floor)
-
 
 def noise_of(camera: CameraNoise, iso: float, step: float) -> Noise:
     """Return the noise at an ISO.
@@ -211,13 +207,12 @@ def _as_camera(slope: float, floor: float, covariance: Floats, camera: CameraNoi
     by_slope = -read_noise / slope
     by_floor = gain / (2.0 * sqrt(reading)) if reading > 0.0 else 0.0
     gradient = np.array([by_slope, by_floor])
-    known: CameraNoise = camera.replace(
+    return camera.replace(
         electrons_per_unit=camera.electrons_per_unit or gain,
         electrons_per_unit_error=None if camera.electrons_per_unit else gain**2 * sqrt(covariance[0, 0]),
         read_noise=read_noise if camera.read_noise is None else camera.read_noise,
         read_noise_error=sqrt(gradient @ covariance @ gradient) if camera.read_noise is None else None,
     )
-    return known
 
 
 def common_black(

@@ -63,20 +63,8 @@ def reduced_frame(
     return Reduced(mean(radiance), mean(variance) / (3 * block**2), (light_px[0] / block, light_px[1] / block), block)
 
 
-def aligned_star(frames: Sequence[Reduced]) -> tuple[Floats, tuple[int, int]]:
-    """Return the light that moves with the light source: a low quantile of the frames aligned at the light.
-
-    Parameters
-    ----------
-    frames : sequence of Reduced
-
-    Returns
-    -------
-    star : ndarray
-        NaN where no frame reaches.
-    middle : tuple of int
-        Row and column of the light.
-    """
+def _aligned_star(frames: Sequence[Reduced]) -> tuple[Floats, tuple[int, int]]:
+    """Return a low quantile of the frames aligned at the light, NaN where none reaches, and its row and column."""
     height, width = frames[0].light.shape
     stack = np.full((len(frames), 2 * height + 1, 2 * width + 1), np.nan, np.float32)
     for k, frame in enumerate(frames):
@@ -113,7 +101,7 @@ def axis_beside_path(
     """
     if len(frames) < 3:
         return None
-    star, middle = aligned_star(frames)
+    star, middle = _aligned_star(frames)
     block = frames[0].block
     reach = max(settings.axis_reach * frames[0].light.shape[1], 4.0)
     offsets = np.arange(-reach, reach + 0.5 * settings.axis_step_px, settings.axis_step_px)
@@ -202,5 +190,4 @@ def _bilinear(picture: Floats, u: Floats, v: Floats) -> Floats:
     a, b = u - i, v - j
     top = picture[j, i] * (1 - a) + picture[j, i + 1] * a
     bottom = picture[j + 1, i] * (1 - a) + picture[j + 1, i + 1] * a
-    mixed: Floats = top * (1 - b) + bottom * b
-    return mixed
+    return top * (1 - b) + bottom * b

@@ -68,5 +68,4 @@ def compress_ghosts(
     del dim
     if rest:
         return with_residual(small, views, threads, journal)
-    out: GhostModel = small.replace(sprites=())
-    return out
+    return small.replace(sprites=())

@@ -96,7 +96,6 @@ def find_ghosts(
     for name in glow:
         tell(f"ghost {name} is no brighter than the residual of halo and star: left out")
     wanted = tuple(ghost for ghost in without_removed(known, ghosts, tell) if ghost.name not in glow)
-    rough: GhostModel = model_of_run(run, wanted, dim, views).replace(
+    return model_of_run(run, wanted, dim, views).replace(
         removed=tuple(ghost for ghost in ghosts if ghost not in wanted)
     )
-    return rough

@@ -107,5 +107,4 @@ def _enlarged(tracks: Tracks, factor: float) -> Tracks:
             for step in track.steps
         )
         ghosts.append(track.replace(steps=steps))
-    out: Tracks = tracks.replace(ghosts=tuple(ghosts))
-    return out
+    return tracks.replace(ghosts=tuple(ghosts))

@@ -67,7 +67,7 @@ def counted_flare(
     }
     scale, top = fit_in(model, fine)
     x, y = light_px(model, constellation_deg, roll_deg)
-    own = within_disc((x * scale, y * scale + top), around * fine[0], fine)
+    own = _within_disc((x * scale, y * scale + top), around * fine[0], fine)
     beyond = (layers["beauty"] - layers["ghosts"]) * (1.0 - own[..., None])
     return tuple(
         Layer(name, binned(pixels, finer).astype(np.float32), (0, 0, width, height))
@@ -81,22 +81,8 @@ def nothing_beyond(model: GhostModel) -> float:
     return 0.5 * float(np.hypot(1.0, height / width))
 
 
-def within_disc(middle_px: tuple[float, float], radius_px: float, size_px: tuple[int, int]) -> Floats:
-    """Compute the part of each pixel that a disc covers.
-
-    Parameters
-    ----------
-    middle_px : tuple of float
-        Position (x, y), inside or outside the picture.
-    radius_px : float
-    size_px : tuple of int
-        Width and height.
-
-    Returns
-    -------
-    ndarray, shape (H, W)
-        From 0 to 1. Sums over pixels change continuously with the disc's position.
-    """
+def _within_disc(middle_px: tuple[float, float], radius_px: float, size_px: tuple[int, int]) -> Floats:
+    """Return the part of each pixel, shape (H, W), that a disc covers; sums are continuous in its position."""
     width, height = size_px
     down = (np.arange(_STRIPS * height) + 0.5) / _STRIPS - middle_px[1]
     half = np.sqrt(np.maximum(radius_px**2 - down**2, 0.0))[:, None]

@@ -67,5 +67,4 @@ def one_colour(
     """
     plane = np.zeros((shape[0], shape[1] + 1))
     draw_ghosts(numbers, counts, there, sigma, frame, plane)
-    light: Floats = plane.cumsum(axis=1)[:, :-1]
-    return light
+    return plane.cumsum(axis=1)[:, :-1]

@@ -9,8 +9,6 @@ from ...model import Project
 from ..core.parameter_vector import fit_in
 from .measured_project import flare_of
 
-__all__ = ["measured_angles_at"]
-
 _STEPS = 50
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import prod
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -116,7 +116,7 @@ def flare_of(project: Project) -> MeasuredFlare:
 def _read(path: str, changed_ns: int) -> MeasuredFlare:
     del changed_ns
     model = read_ghost_model(path)
-    return MeasuredFlare(Path(path).name, model, cast(GhostModel, model.replace(sprites=())))
+    return MeasuredFlare(Path(path).name, model, model.replace(sprites=()))
 
 
 def render_any(project: Project, *, progress: Progress | None = None, limit: bool = False) -> Rendering:
@@ -329,7 +329,7 @@ def _ghosts_by_hand(
             alike.setdefault(gain, []).append(ghost.name)
     pixels = np.zeros((size[1], size[0], 3), dtype=np.float32)
     for gain, names in alike.items():
-        some = cast(GhostModel, flare.bare.replace(ghosts=[one for one in flare.bare.ghosts if one.name in names]))
+        some = flare.bare.replace(ghosts=[one for one in flare.bare.ghosts if one.name in names])
         for one in seen:
             light = draw(some, one.constellation_deg, one.roll_deg, size)
             pixels += (light @ (np.array(gain)[:, None] * one.colours).T).astype(np.float32)
@@ -433,8 +433,7 @@ def with_sensor(project: Project) -> Project:
     model = flare_of(project).model
     if project.camera.sensor_mm is not None or model.sensor_width_mm is None:
         return project
-    changed: Project = project.replace(camera=project.camera.replace(sensor_mm=sensor_of(project, model)))
-    return changed
+    return project.replace(camera=project.camera.replace(sensor_mm=sensor_of(project, model)))
 
 
 def efl_mm(project: Project, model: GhostModel) -> float:
@@ -467,9 +466,3 @@ def _remarks(project: Project, flare: MeasuredFlare, seen: Sequence[_Seen], tota
     if not total.pixels.any():
         reported.append(BLACK if any(one.part > 0.0 for one in seen) else HIDDEN)
     return tuple(reported)
-
-
-__all__ = [
-    "MeasuredFlare", "check_measured", "efl_mm", "flare_of", "is_measured", "opening_of", "render_any",
-    "render_measured",
-]  # fmt: skip

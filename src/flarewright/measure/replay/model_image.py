@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import lru_cache
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 
@@ -43,10 +43,7 @@ def light_px(model: GhostModel, constellation_deg: float, roll_deg: float = 0.0)
     t = float(np.tan(np.radians(constellation_deg)))
     reach = model.focal_px * t * (1.0 + model.distortion * t * t)
     turn = np.radians(roll_deg)
-    return (
-        model.axis_px[0] + reach * float(np.cos(turn)),
-        model.axis_px[1] - reach * float(np.sin(turn)),
-    )
+    return (model.axis_px[0] + reach * float(np.cos(turn)), model.axis_px[1] - reach * float(np.sin(turn)))
 
 
 def replay_model(
@@ -292,7 +289,7 @@ def _single(
     for ghost, there in zip(model.ghosts, _there(model, model.ghosts, constellation_deg), strict=True):
         if not there:
             continue
-        alone = cast(GhostModel, bare.replace(ghosts=(ghost,)))
+        alone = bare.replace(ghosts=(ghost,))
         pixels = draw(alone, constellation_deg, roll_deg, size) * gain
         # rows are sums of differences, whose rounding leaves values where there is no light
         lit = np.argwhere((pixels > _ROUNDING * gain * _most_light(ghost)).any(axis=2))

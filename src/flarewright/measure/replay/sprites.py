@@ -38,8 +38,7 @@ def where_predicted(model: GhostModel, learn: Callable[[Sprite], Sprite]) -> Gho
         learn(one) if one.follows == "ghosts" and len(one.constellation_deg) >= _FEWEST else one
         for one in model.sprites
     )
-    out: GhostModel = model.replace(sprites=sprites)
-    return out
+    return model.replace(sprites=sprites)
 
 
 def sprite_interval(knots: Floats, constellation_deg: float | Floats) -> tuple[Indices, Floats]:

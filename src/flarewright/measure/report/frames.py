@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import log10
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,7 +111,7 @@ def _placed(
 
 def bare(model: GhostModel) -> GhostModel:
     """Return a model with its ghosts only."""
-    return cast(GhostModel, model.replace(sprites=(), halo=None, star=None))
+    return model.replace(sprites=(), halo=None, star=None)
 
 
 def ghosts_alone(
@@ -209,11 +208,7 @@ def _outline(layer: Layer, size: tuple[int, int]) -> tuple[Indices, Indices]:
 
 
 def _free_place(
-    x: Indices,
-    y: Indices,
-    layer: Layer,
-    taken: Sequence[tuple[float, float]],
-    size: tuple[int, int],
+    x: Indices, y: Indices, layer: Layer, taken: Sequence[tuple[float, float]], size: tuple[int, int]
 ) -> tuple[float, float]:
     """Return a position for a ghost's name: just outside its outline and away from other names."""
     left, top, wide, high = layer.window

@@ -64,8 +64,7 @@ def _learned(sprite: Sprite, views: Sequence[View], threads: int | None) -> Spri
     # the first and the last photograph have no neighbour on one side
     gone = np.stack([inner[0], *inner, inner[-1]])
     cells = _over_blocks(np.maximum(gone[:-1], gone[1:]))
-    out: Sprite = sprite.replace(reaches=packed_reaches(_BLOCK, cells))
-    return out
+    return sprite.replace(reaches=packed_reaches(_BLOCK, cells))
 
 
 def _over_blocks(cells: Cells) -> Cells:

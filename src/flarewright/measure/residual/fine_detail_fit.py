@@ -75,8 +75,7 @@ def _learned(
         predicted = list(pool.map(lambda k: _predicted(sprite, moves, pictures, known[k], angles, k), inner))
     ways, shares = _chosen(np.stack(predicted))
     detail: Detail = packed_detail(moves.block, _PARTS, unit, cells, ways, shares)
-    out: Sprite = sprite.replace(detail=detail)
-    return out
+    return sprite.replace(detail=detail)
 
 
 def _predicted(sprite: Sprite, moves: Moves, pictures: Sequence[Pixels], known: Mask, angles: Floats, k: int) -> Floats:

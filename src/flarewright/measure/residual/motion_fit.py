@@ -74,8 +74,7 @@ def _learned(sprite: Sprite, packed: Packed, model: GhostModel, threads: int | N
     (missed, steps), (missed_together, steps_together) = alone, together
     shares = _shares([_averaged(each, sprite.unit) for each in (still, missed, missed_together)])
     both = np.stack([steps, steps_together], axis=1)
-    out: Sprite = sprite.replace(moves=packed_moves(_BLOCK, both, shares[:, 1:]))
-    return out
+    return sprite.replace(moves=packed_moves(_BLOCK, both, shares[:, 1:]))
 
 
 def _motion_of(

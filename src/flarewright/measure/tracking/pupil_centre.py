@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
@@ -136,6 +135,6 @@ def _perturbed_curves(curves: Curves) -> Iterator[tuple[Curves, Curves]]:
                 step = _STEP * error * np.eye(len(curve.values))[k]
                 more, less = (tuple(map(float, np.array(curve.values) + each)) for each in (step, -step))
                 yield (
-                    cast(Curves, curves.replace(**{name: curve.replace(values=more)})),
-                    cast(Curves, curves.replace(**{name: curve.replace(values=less)})),
+                    curves.replace(**{name: curve.replace(values=more)}),
+                    curves.replace(**{name: curve.replace(values=less)}),
                 )

@@ -67,13 +67,7 @@ def cost(picture: Floats, wanted: Floats, wanted_edges: Floats | None = None) ->
 
 
 def descend_gradient(
-    start: Floats,
-    wanted: Floats,
-    frame: Floats,
-    window: tuple[int, int, int, int],
-    *,
-    rounds: int = 200,
-    rate: float = 1.0,
+    start: Floats, wanted: Floats, frame: Floats, window: tuple[int, int, int, int], *, rounds: int = 200
 ) -> Descent:
     """Fit one ghost in one image by online gradient descent.
 
@@ -87,8 +81,6 @@ def descend_gradient(
         left, top, width, height.
     rounds : int
         Each round changes every number once, shape numbers before brightness.
-    rate : float
-        Initial learning rate; it is halved after a round without progress.
 
     Returns
     -------
@@ -117,7 +109,8 @@ def descend_gradient(
         trial[2:5], trial[9:] = np.maximum(trial[2:5], 0.5), np.maximum(trial[9:], 1e-6)
         return with_bounded_controls(trial)
 
-    here = look(numbers)
+    # the learning rate is halved after a round without progress
+    here, rate = look(numbers), 1.0
     for _ in range(rounds):
         before = here
         for at, step in groups:

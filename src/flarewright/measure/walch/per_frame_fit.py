@@ -11,7 +11,6 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
@@ -73,7 +72,7 @@ def fit_as_walch(
     """
     views = read_views(folder, run, every)
     seen = subtract_glow(views, rough.halo, rough.star, settings=settings.glow)
-    bare = cast(GhostModel, rough.replace(sprites=(), removed=()))
+    bare = rough.replace(sprites=(), removed=())
     whole = [draw(bare, view.constellation_deg, view.roll_deg, view.size_px) for view in seen]
     spots = [{spot.name: spot for spot in _spots(bare, view)} for view in seen]
     steps, found = journal or Journal(), []
@@ -97,7 +96,7 @@ def fit_as_walch(
                 tell(f"ghost {name}: {count(len(angles), 'picture')}")
             progress(min(begin + _AT_ONCE, len(names)) / len(names), f"ghost {some[-1]}")
     reported = "fitted with Walch's primitive and by his gradient descent (2017), for comparison"
-    model = cast(GhostModel, bare.replace(ghosts=tuple(found), remarks=(*rough.remarks, reported)))
+    model = bare.replace(ghosts=tuple(found), remarks=(*rough.remarks, reported))
     return with_residual(model, views, threads, journal) if rest else model
 
 
@@ -112,7 +111,7 @@ def _fitted_over_images(
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Fit one ghost from image to image; return its constellations, shape (K,), and its numbers, (K, 19)."""
     ghost = next(one for one in model.ghosts if one.name == name)
-    alone = cast(GhostModel, model.replace(ghosts=(ghost,)))
+    alone = model.replace(ghosts=(ghost,))
     angles, fitted = [], []
     before: tuple[Floats, Spot] | None = None
     for view, light, there in zip(views, whole, spots, strict=True):

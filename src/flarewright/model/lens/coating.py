@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field
 
+from ...errors import ProjectError
 from ..base import Frozen
 
 Index = Annotated[float, Field(ge=1.0, le=4.0)]
@@ -47,6 +48,7 @@ class Stack(Frozen):
 
 
 StandardName = Literal["uncoated-1930s", "single-1950s", "early-multicoat", "modern-broadband"]
+STANDARD_NAMES: tuple[StandardName, ...] = get_args(StandardName)
 
 
 class Standard(Frozen):
@@ -62,6 +64,8 @@ class Standard(Frozen):
 
     def __init__(self, word: StandardName | None = None, /, **fields: Any) -> None:
         """Accept the name as a positional argument or as a keyword."""
+        if word is not None and word not in STANDARD_NAMES:
+            raise ProjectError(f"{word!r} is no standard coating; use one of {', '.join(STANDARD_NAMES)}")
         super().__init__(**({} if word is None else {"name": word}), **fields)
 
 

@@ -70,8 +70,8 @@ class RawLens(Frozen):
         From the header comment; None when it states none.
     focal_length : float or None
         The `focal_length:` line in mm; None for infinity or when missing.
-    stated_surfaces, stated_elements : int or None
-        Counts of the header comment.
+    stated_surfaces : int or None
+        Count of the header comment.
     rows : tuple of RawRow
     remarks : tuple of str
         What the reader noticed (glasses, odd lines).
@@ -84,7 +84,6 @@ class RawLens(Frozen):
     f_number: float | None = None
     focal_length: float | None = None
     stated_surfaces: int | None = None
-    stated_elements: int | None = None
     rows: tuple[RawRow, ...]
     remarks: tuple[str, ...] = ()
 

@@ -91,6 +91,5 @@ class Scatter(Frozen):
         for exception in self.rows:
             if exception.row == row:
                 changes = {key: value for key, value in exception if value is not None and key != "row"}
-                found: Scatter = self.replace(rows=(), **changes)
-                return found
+                return self.replace(rows=(), **changes)
         return self

@@ -249,8 +249,7 @@ class MergedFrame:
     @property
     def valid(self) -> Mask:
         """Where `radiance` was measured, shape (height, width, 3)."""
-        valid: Mask = np.isfinite(self.variance)
-        return valid
+        return np.isfinite(self.variance)
 
     @property
     def constellation_deg(self) -> float:
@@ -271,8 +270,3 @@ class MergedFrame:
     def axis_px(self) -> tuple[float, float]:
         """(x, y) of the optical axis."""
         return self.info.axis_px
-
-    @property
-    def horizon_deg(self) -> float:
-        """Measured minus nominal roll, degrees, counter-clockwise."""
-        return self.info.horizon_deg

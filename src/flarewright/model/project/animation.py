@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from ..base import Frozen
 from ..lens.prescription import LARGEST_F_NUMBER, LEAST_F_NUMBER
@@ -37,6 +37,14 @@ _RANGES: dict[str, tuple[float, float]] = {
 At = Annotated[float, Field(ge=0.0, le=LAST_S)]
 
 
+def rising(at_s: tuple[float, ...]) -> tuple[float, ...]:
+    """Return times unchanged; raises ValueError unless they rise."""
+    for before, after in pairwise(at_s):
+        if after <= before:
+            raise ValueError(f"times of keys must rise: {after:g} s follows {before:g} s")
+    return at_s
+
+
 class Curve(Frozen):
     """A value over time; constant before its first key and after its last one.
 
@@ -52,14 +60,9 @@ class Curve(Frozen):
     """
 
     of: str
-    at_s: tuple[At, ...] = Field(min_length=1, max_length=10000)
+    at_s: Annotated[tuple[At, ...], AfterValidator(rising)] = Field(min_length=1, max_length=10000)
     values: tuple[float | tuple[float, float, float], ...] = Field(min_length=1, max_length=10000)
     motion: Motion = "linear"
-
-    @field_validator("at_s")
-    @classmethod
-    def _times_rise(cls, at_s: tuple[float, ...]) -> tuple[float, ...]:
-        return rising(at_s)
 
     @field_validator("values")
     @classmethod
@@ -80,6 +83,9 @@ class Curve(Frozen):
             if of == "rgb" and max(parts) <= 0.0:
                 raise ValueError("black has no colour; give red, green or blue above 0, and a curve of intensity")
         return values
+
+
+AnyCurve = TypeVar("AnyCurve", bound=Curve)
 
 
 class LightCurve(Curve):
@@ -122,19 +128,12 @@ class Timeline(Frozen):
     start: int = Field(1, ge=FIRST_FRAME, le=LAST_FRAME)
 
 
-def rising(at_s: tuple[float, ...]) -> tuple[float, ...]:
-    """Return times unchanged; raises ValueError unless they rise."""
-    for before, after in pairwise(at_s):
-        if after <= before:
-            raise ValueError(f"times of keys must rise: {after:g} s follows {before:g} s")
-    return at_s
-
-
-def one_curve_each(curves: tuple[Curve, ...]) -> None:
-    """Raise ValueError if two curves set the same value."""
+def one_curve_each(curves: tuple[AnyCurve, ...]) -> tuple[AnyCurve, ...]:
+    """Return curves unchanged; raises ValueError if two set the same value."""
     names = [curve.of for curve in curves]
     for name in names:
         if names.count(name) > 1:
             raise ValueError(f"there are {names.count(name)} curves of {name}; keep one")
     if "rgb" in names and "temperature_k" in names:
         raise ValueError("curves of rgb and of temperature_k both set the colour of a light; keep one")
+    return curves

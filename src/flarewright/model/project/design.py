@@ -14,8 +14,7 @@ Index = Annotated[float, Field(gt=1.0, lt=4.0)]
 
 # a single name is accepted without a list
 Names = Annotated[
-    tuple[str, ...],
-    WithJsonSchema({"anyOf": [{"type": "string"}, {"items": {"type": "string"}, "type": "array"}]}),
+    tuple[str, ...], WithJsonSchema({"anyOf": [{"type": "string"}, {"items": {"type": "string"}, "type": "array"}]})
 ]
 
 

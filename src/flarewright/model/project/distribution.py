@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from ..base import Frozen
 
@@ -17,6 +17,15 @@ _HOW = (
     "write a number, a list of choices, { choice = [...], weights = [...] }, { uniform = [low, high] }, "
     "{ log_uniform = [low, high] }, { normal = [mean, deviation], bounds = [low, high] } or { integers = [low, high] }"
 )
+
+
+def rising_limits(limits: tuple[float, float]) -> tuple[float, float]:
+    """Return two limits unchanged; raises ValueError unless the second is above the first."""
+    if limits[1] < limits[0]:
+        raise ValueError(f"{limits[0]:g} to {limits[1]:g} runs backwards; write the least number first")
+    if limits[1] == limits[0]:
+        raise ValueError(f"{limits[0]:g} to {limits[1]:g} is a single number; write {limits[0]:g} alone")
+    return limits
 
 
 class Constant(Frozen):
@@ -57,12 +66,7 @@ class Choice(Frozen):
 class Uniform(Frozen):
     """Every number between two equally often."""
 
-    uniform: tuple[Number, Number]
-
-    @field_validator("uniform")
-    @classmethod
-    def _rises(cls, limits: tuple[float, float]) -> tuple[float, float]:
-        return rising_limits(limits)
+    uniform: Annotated[tuple[Number, Number], AfterValidator(rising_limits)]
 
     @property
     def support(self) -> tuple[float, float]:
@@ -250,15 +254,6 @@ Texts = Annotated[TextChoice, BeforeValidator(_texts)]
 """One of several texts; a plain text or list is a `TextChoice`."""
 
 
-def rising_limits(limits: tuple[float, float]) -> tuple[float, float]:
-    """Return two limits unchanged; raises ValueError unless the second is above the first."""
-    if limits[1] < limits[0]:
-        raise ValueError(f"{limits[0]:g} to {limits[1]:g} runs backwards; write the least number first")
-    if limits[1] == limits[0]:
-        raise ValueError(f"{limits[0]:g} to {limits[1]:g} is a single number; write {limits[0]:g} alone")
-    return limits
-
-
 def fitting_weights(weights: tuple[float, ...] | None, choices: tuple[Any, ...] | None) -> tuple[float, ...] | None:
     """Return weights unchanged; raises ValueError unless there is one per choice and one is above 0."""
     if weights is None or choices is None:
@@ -268,21 +263,3 @@ def fitting_weights(weights: tuple[float, ...] | None, choices: tuple[Any, ...] 
     if not sum(weights) > 0.0:
         raise ValueError("all weights are 0, so nothing can be drawn; give one above 0")
     return weights
-
-
-__all__ = [
-    "KINDS",
-    "AnyDistribution",
-    "Choice",
-    "Constant",
-    "Distribution",
-    "Integers",
-    "LogUniform",
-    "Normal",
-    "TextChoice",
-    "Texts",
-    "Uniform",
-    "fitting_weights",
-    "rising_limits",
-    "within",
-]

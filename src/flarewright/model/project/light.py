@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import Field, StrictBool, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, StrictBool, ValidationInfo, field_validator, model_validator
 
 from ..base import Frozen
 from .animation import LARGEST_INTENSITY, LAST_S, LightCurve, Motion, one_curve_each
@@ -112,10 +112,7 @@ class Polygon(Frozen):
     corners_deg: tuple[tuple[float, float], ...] = Field(min_length=3, max_length=256)
 
 
-FieldAngles = tuple[
-    Annotated[float, Field(gt=-90.0, lt=90.0)],
-    Annotated[float, Field(gt=-90.0, lt=90.0)],
-]
+FieldAngles = tuple[Annotated[float, Field(gt=-90.0, lt=90.0)], Annotated[float, Field(gt=-90.0, lt=90.0)]]
 
 Shape = Annotated[Rectangle | Polygon, Field(discriminator="kind")]
 
@@ -170,7 +167,7 @@ class Light(Frozen):
     # as many as a curve has: one a frame of a long track
     keyframes: tuple[LightKey, ...] = Field((), max_length=10000)
     motion: Motion = "linear"
-    curves: tuple[LightCurve, ...] = ()
+    curves: Annotated[tuple[LightCurve, ...], AfterValidator(one_curve_each)] = ()
 
     @field_validator("diameter_deg")
     @classmethod
@@ -193,12 +190,6 @@ class Light(Frozen):
             if after <= before:
                 raise ValueError(f"keyframes must rise in time: {after:g} s follows {before:g} s")
         return keyframes
-
-    @field_validator("curves")
-    @classmethod
-    def _one_curve_each(cls, curves: tuple[LightCurve, ...]) -> tuple[LightCurve, ...]:
-        one_curve_each(curves)
-        return curves
 
     @property
     def extended(self) -> bool:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, StrictBool, field_validator, model_validator
+from pydantic import AfterValidator, Field, StrictBool, field_validator, model_validator
 
+from ...errors import ProjectError
 from ..base import Frozen
-from ..lens.coating import COATINGS, Coating
+from ..lens.coating import COATINGS, STANDARD_NAMES, Coating
 from ..lens.imperfection import Imperfection
 from ..lens.iris import Iris
 from ..lens.plate import Plate
@@ -249,7 +250,7 @@ class Project(Frozen):
     holdout: Holdout | None = None
     art: Art = Art()
     design: Design | None = None
-    curves: tuple[ProjectCurve, ...] = ()
+    curves: Annotated[tuple[ProjectCurve, ...], AfterValidator(one_curve_each)] = ()
     timeline: Timeline = Timeline()
     plate: Backplate | None = None
 
@@ -262,17 +263,11 @@ class Project(Frozen):
     @classmethod
     def _coating_is_no_text(cls, coating: Any) -> Any:
         if isinstance(coating, str):
-            raise ValueError(
-                f"{coating!r} is a text; write coating=flarewright.parse_coating_choice({coating!r}), or pass it to "
-                "flarewright.render next to the project"
+            raise ProjectError(
+                f"coating {coating!r} is a text; write coating=flarewright.Standard(NAME) with one of "
+                f"{', '.join(STANDARD_NAMES)}, or flarewright.parse_coating_choice({coating!r}) for others"
             )
         return everywhere(coating)
-
-    @field_validator("curves")
-    @classmethod
-    def _one_curve_each(cls, curves: tuple[ProjectCurve, ...]) -> tuple[ProjectCurve, ...]:
-        one_curve_each(curves)
-        return curves
 
     @field_validator("zoom")
     @classmethod

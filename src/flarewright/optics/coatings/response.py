@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike
 
 from flarewright.model import D65, Coating, Film
 
+from ...colorimetry import VISIBLE_NM
 from ...typing import Floats
 from ..colour.rgb import luminance_weights
-from ..colour.spectrum import VISIBLE_NM, band_weights
+from ..colour.spectrum import band_weights
 from .thin_film import film_stack, stack_reflectance
 
 BAND_NM = (420.0, 680.0)

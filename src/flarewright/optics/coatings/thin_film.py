@@ -22,14 +22,6 @@ from .presets import MGF2, standard_films
 MAGNESIUM_FLUORIDE = MGF2
 """Lowest index of real coating materials."""
 
-__all__ = [
-    "MAGNESIUM_FLUORIDE",
-    "film_stack",
-    "reflectance_table",
-    "stack_reflectance",
-    "stack_reflectance_transmittance",
-]
-
 
 def film_stack(coating: Coating | None, n_front: float, n_back: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the films of a coating in the order in which light along +z meets them.
@@ -258,8 +250,7 @@ def _check(
 
 def _cos_squared(n0: Floats, n: Floats | float, c0: Floats) -> Floats:
     """Return cos^2 in the medium n by Snell's law, negative beyond the critical angle; exact for n = n0 at grazing."""
-    c2: Floats = ((n - n0) * (n + n0) + (n0 * c0) ** 2) / (n * n)
-    return c2
+    return ((n - n0) * (n + n0) + (n0 * c0) ** 2) / (n * n)
 
 
 def _cos_and_sinc(x: Floats) -> tuple[Floats, Floats, Floats]:

@@ -85,8 +85,8 @@ D65_POWER = (
 )
 # fmt: on
 
-LAST_NM = FIRST_NM + STEP_NM * (len(Y_BAR) - 1)
-"""Range of the colour matching functions, 360 to 830 nm."""
+TABLE_NM = FIRST_NM + STEP_NM * np.arange(len(Y_BAR), dtype=np.float64)
+"""Wavelengths of the tables, 360 to 830 nm."""
 
 
 def cie_1931(wavelength_nm: ArrayLike) -> Floats:
@@ -115,7 +115,7 @@ def cmf_at_1_nm() -> tuple[Floats, Floats]:
     """Return wavelengths (L,) and colour matching functions (L, 3) every 1 nm, by Lagrange's cubic."""
     table = np.array([X_BAR, Y_BAR, Z_BAR]).T
     last = len(table) - 1
-    nm = np.arange(FIRST_NM, LAST_NM + 1, dtype=np.float64)
+    nm = np.arange(TABLE_NM[0], TABLE_NM[-1] + 1.0)
     at = (nm - FIRST_NM) / STEP_NM
     first = np.clip(np.floor(at).astype(np.intp) - 1, 0, last - 3)
     t = at - first

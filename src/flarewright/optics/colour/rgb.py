@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache, reduce
 from typing import Any
 
@@ -10,18 +11,10 @@ from numpy.typing import NDArray
 
 from flarewright.model.project.camera import Colorspace
 
+from ...colorimetry import D65_WHITE, PRIMARIES, rgb_to_xyz, xyz_of
 from ...typing import Floats
 
-D65_WHITE = (0.3127, 0.3290)
-"""Chromaticity of the white of Rec.709 (ITU-R BT.709-6, item 1.4)."""
-
-ACES_WHITE = (0.32168, 0.33767)
-"""Chromaticity of the ACES white point (SMPTE ST 2065-1, TB-2018-001), near D60."""
-
-_PRIMARIES = {
-    "rec709": ((0.640, 0.330), (0.300, 0.600), (0.150, 0.060)),
-    "acescg": ((0.713, 0.293), (0.165, 0.830), (0.128, 0.044)),
-}
+_PRIMARIES = {"rec709": PRIMARIES["lin_rec709_scene"], "acescg": PRIMARIES["lin_ap1_scene"]}
 _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 
 # linear Rec.709 to cone responses, and their cube roots to lightness, green-red and blue-yellow
@@ -35,16 +28,6 @@ _OKLAB_AXES = np.array([
     [1.9779984951, -2.4285922050, 0.4505937099],
     [0.0259040371, 0.7827717662, -0.8086757660],
 ])  # fmt: skip
-
-__all__ = [
-    "ACES_WHITE",
-    "D65_WHITE",
-    "adapted_to_rgb_matrix",
-    "brightest_channel",
-    "luminance_weights",
-    "oklab",
-    "xyz_to_rgb_matrix",
-]
 
 
 @lru_cache
@@ -72,21 +55,18 @@ def xyz_to_rgb_matrix(colorspace: Colorspace) -> Floats:
     """
     if colorspace not in _PRIMARIES:
         raise ValueError(f"colour space {colorspace!r} is unknown; use one of {', '.join(_PRIMARIES)}")
-    matrix = adapted_to_rgb_matrix(_PRIMARIES[colorspace], D65_WHITE if colorspace == "rec709" else ACES_WHITE)
+    matrix = adapted_to_rgb_matrix(_PRIMARIES[colorspace])
     matrix.flags.writeable = False
     return matrix
 
 
-def adapted_to_rgb_matrix(
-    primaries: tuple[tuple[float, float], tuple[float, float], tuple[float, float]], white: tuple[float, float]
-) -> Floats:
+def adapted_to_rgb_matrix(primaries: Sequence[float]) -> Floats:
     """Return the matrix from XYZ (D65 white, Y = 1) to linear RGB of primaries and a white, adapted to that white.
 
     Parameters
     ----------
-    primaries : tuple of (x, y)
-        Chromaticities of red, green and blue.
-    white : tuple of float
+    primaries : sequence of float, length 8
+        Chromaticities of red, green, blue and white.
 
     Returns
     -------
@@ -96,24 +76,11 @@ def adapted_to_rgb_matrix(
     -----
     As `xyz_to_rgb_matrix`.
     """
-    matrix: Floats = np.linalg.inv(_rgb_to_xyz(primaries, white)) @ _bradford(D65_WHITE, white)
-    return matrix
+    return np.linalg.inv(rgb_to_xyz(primaries)) @ _bradford(D65_WHITE, primaries[6:])
 
 
-def _xyz(xy: tuple[float, float]) -> Floats:
-    """Return XYZ with Y = 1 of a chromaticity."""
-    x, y = xy
-    return np.array([x / y, 1.0, (1.0 - x - y) / y])
-
-
-def _rgb_to_xyz(primaries: tuple[tuple[float, float], ...], white: tuple[float, float]) -> Floats:
-    P = np.stack([_xyz(xy) for xy in primaries], axis=1)
-    scaled: Floats = P * np.linalg.solve(P, _xyz(white))
-    return scaled
-
-
-def _bradford(source: tuple[float, float], target: tuple[float, float]) -> Floats:
-    gain = (_BRADFORD @ _xyz(target)) / (_BRADFORD @ _xyz(source))
+def _bradford(source: Sequence[float], target: Sequence[float]) -> Floats:
+    gain = (_BRADFORD @ xyz_of(target)) / (_BRADFORD @ xyz_of(source))
     adapted: Floats = np.linalg.inv(_BRADFORD) @ np.diag(gain) @ _BRADFORD
     return adapted
 

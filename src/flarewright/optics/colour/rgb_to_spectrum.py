@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from ...typing import Floats
-from .cie1931 import D65_POWER, FIRST_NM, STEP_NM, cie_1931
+from .cie1931 import D65_POWER, TABLE_NM, cmf_at_1_nm
 from .rgb import xyz_to_rgb_matrix
 
 # brightest channel of the fitted curve: the scale is arbitrary, and half leaves room on both sides
@@ -16,8 +16,6 @@ _BRIGHTEST = 0.5
 _NEWTON_STEPS = 24
 # converged when no channel has an error above this fraction of the brightest
 CLOSE = 1e-6
-
-__all__ = ["CLOSE", "smoothest_reflectance", "uplift"]
 
 
 def smoothest_reflectance(coefficients: tuple[float, float, float], wavelength_nm: Floats) -> Floats:
@@ -42,8 +40,7 @@ def smoothest_reflectance(coefficients: tuple[float, float, float], wavelength_n
     u = (np.asarray(wavelength_nm, dtype=np.float64) - 580.0) / 200.0
     c0, c1, c2 = coefficients
     x = (c0 * u + c1) * u + c2
-    curve: Floats = 0.5 + 0.5 * x / np.sqrt(1.0 + x * x)
-    return curve
+    return 0.5 + 0.5 * x / np.sqrt(1.0 + x * x)
 
 
 @lru_cache(maxsize=1024)
@@ -101,8 +98,7 @@ def _newton_step(c: Floats, aim: Floats, u: Floats, response: Floats) -> tuple[F
 @lru_cache
 def _response() -> tuple[Floats, Floats]:
     """Return u of every wavelength (L,), and the linear Rec.709 of a flat curve's light there (L, 3), sum (1, 1, 1)."""
-    table_nm = FIRST_NM + STEP_NM * np.arange(len(D65_POWER), dtype=np.float64)
-    wave = np.arange(FIRST_NM, table_nm[-1] + 1.0)
-    lit = np.interp(wave, table_nm, D65_POWER)[:, None] * cie_1931(wave)
+    wave, cmf = cmf_at_1_nm()
+    lit = np.interp(wave, TABLE_NM, D65_POWER)[:, None] * cmf
     rgb = lit @ xyz_to_rgb_matrix("rec709").T
     return (wave - 580.0) / 200.0, rgb / rgb.sum(axis=0)

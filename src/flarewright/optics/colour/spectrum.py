@@ -11,34 +11,13 @@ from flarewright.errors import FlarewrightError
 from flarewright.model.project.camera import Colorspace
 from flarewright.model.project.light import D65, BlackBody, EqualEnergy, Lines, Rgb, Spectrum
 
+from ...colorimetry import VISIBLE_NM
 from ...typing import Floats
-from .cie1931 import D65_POWER, FIRST_NM, STEP_NM, Y_BAR, cie_1931, cmf_at_1_nm
+from .cie1931 import D65_POWER, TABLE_NM, cie_1931, cmf_at_1_nm
 from .rgb import xyz_to_rgb_matrix
 from .rgb_to_spectrum import smoothest_reflectance, uplift
 
-VISIBLE_NM = (360.0, 830.0)
-"""Range over which colours are integrated: that of the colour matching functions (CIE 018:2019). Of X, Y and Z, 4e-6 of
-daylight and 12e-6 of an incandescent lamp lie beyond 780 nm, but films reflect so much there that it counts in ghosts
-under a black body of 2000 K."""
-
 _H, _C, _KB = 6.62607015e-34, 299792458.0, 1.380649e-23  # exact SI values
-
-__all__ = [
-    "VISIBLE_NM",
-    "band_contents",
-    "band_parts",
-    "band_shares",
-    "band_weights",
-    "covers_all_lines",
-    "cubics",
-    "hats",
-    "luminance_shares",
-    "planck",
-    "sampled_wavelengths",
-    "spectral_power",
-    "spectrum_xyz",
-    "traced_wavelengths",
-]
 
 
 def planck(wavelength_nm: ArrayLike, temperature_k: float) -> Floats:
@@ -55,8 +34,7 @@ def planck(wavelength_nm: ArrayLike, temperature_k: float) -> Floats:
         W / (m^2 sr nm), the shape of `wavelength_nm`.
     """
     lam = np.asarray(wavelength_nm, dtype=np.float64) * 1e-9
-    radiance: Floats = 2e-9 * _H * _C**2 / lam**5 / np.expm1(_H * _C / (lam * _KB * temperature_k))
-    return radiance
+    return 2e-9 * _H * _C**2 / lam**5 / np.expm1(_H * _C / (lam * _KB * temperature_k))
 
 
 def spectral_power(spectrum: Spectrum, wavelength_nm: ArrayLike) -> Floats:
@@ -83,7 +61,7 @@ def spectral_power(spectrum: Spectrum, wavelength_nm: ArrayLike) -> Floats:
         return np.ones_like(wave)
     if isinstance(spectrum, D65):
         # D65 is defined as linear between steps of 10 nm, so this is exact
-        return np.interp(wave, _table_nm(), D65_POWER, left=0.0, right=0.0)
+        return np.interp(wave, TABLE_NM, D65_POWER, left=0.0, right=0.0)
     if isinstance(spectrum, BlackBody):
         return planck(wave, spectrum.temperature_k)
     if isinstance(spectrum, Lines):
@@ -128,8 +106,7 @@ def traced_wavelengths(count: int, spectrum: Spectrum | None = None) -> Floats:
             return lines
     if count == 3:
         return np.array([450.0, 540.0, 610.0])
-    midpoints: Floats = 395.0 + 310.0 * (np.arange(count) + 0.5) / count
-    return midpoints
+    return 395.0 + 310.0 * (np.arange(count) + 0.5) / count
 
 
 def sampled_wavelengths(count: int, spectrum: Spectrum | None = None) -> Floats:
@@ -153,8 +130,7 @@ def sampled_wavelengths(count: int, spectrum: Spectrum | None = None) -> Floats:
         lines = traced_wavelengths(cells, spectrum)
         if covers_all_lines(spectrum, lines):
             return lines
-    midpoints: Floats = low + (high - low) * (np.arange(cells) + 0.5) / cells
-    return midpoints
+    return low + (high - low) * (np.arange(cells) + 0.5) / cells
 
 
 def covers_all_lines(spectrum: Spectrum, wavelengths_nm: ArrayLike) -> bool:
@@ -231,7 +207,7 @@ def band_weights(
     colorspace : {"rec709", "acescg"}
     cubic : bool
         Integrate what is cubic between the nodes instead of linear, for nodes as dense as `sampled_wavelengths`: what
-        two films reflect can grow by a factor of 13 within 20 nm, and a line between nodes 5 nm apart is 3 % too bright.
+        two films reflect can grow by a factor of 13 within 20 nm, and lines between nodes 5 nm apart are 3 % too bright.
 
     Returns
     -------
@@ -253,8 +229,7 @@ def band_weights(
     weights of `cubics`.
     """
     wave, xyz = _stimulus(spectrum)
-    weights: Floats = (cubics if cubic else hats)(wave, wavelengths_nm) @ xyz @ xyz_to_rgb_matrix(colorspace).T
-    return weights
+    return (cubics if cubic else hats)(wave, wavelengths_nm) @ xyz @ xyz_to_rgb_matrix(colorspace).T
 
 
 def band_parts(spectrum: Spectrum, wavelengths_nm: ArrayLike, colorspace: Colorspace, curve_nm: ArrayLike) -> Floats:
@@ -422,10 +397,6 @@ def _band_contents(spectrum: Spectrum, nodes_nm: tuple[float, ...]) -> tuple[tup
         held = (wave[first:last][lit], share[lit] / share[lit].sum()) if most > 0.0 else (np.array([node]), np.ones(1))
         found.append(held)
     return tuple(found)
-
-
-def _table_nm() -> Floats:
-    return FIRST_NM + STEP_NM * np.arange(len(Y_BAR), dtype=np.float64)
 
 
 def _stimulus(spectrum: Spectrum) -> tuple[Floats, Floats]:

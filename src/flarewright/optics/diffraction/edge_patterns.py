@@ -48,17 +48,6 @@ _WAVE_SAMPLES = 8
 # straight blades are alike at every s: an arbitrary offset, in s
 _STRAIGHT_OFFSET = 64.0
 
-__all__ = [
-    "CORNER_SAMPLES",
-    "EDGE_SAMPLES",
-    "PROFILE_SAMPLES",
-    "EdgeTables",
-    "averaged",
-    "edge_tables",
-    "gain",
-    "sharp_tables",
-]
-
 
 @dataclass(frozen=True)
 class EdgeTables:

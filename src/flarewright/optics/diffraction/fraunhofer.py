@@ -29,17 +29,6 @@ CORE_REACH = 60.0
 
 FAN_BINS = 720
 
-__all__ = [
-    "CORE_REACH",
-    "BladeWings",
-    "FanWings",
-    "Pattern",
-    "Soil",
-    "SpikeProfile",
-    "pupil_pattern",
-    "spike_profile",
-]
-
 
 @dataclass(frozen=True)
 class FanWings:
@@ -395,16 +384,11 @@ def _measured_fans(P: Floats, s: Floats, reach: float) -> FanWings:
 
 def _ring_window(t: Floats) -> Floats:
     """Return a window that is 0 at a quarter and at 1, symmetric in the logarithm between."""
-    window: Floats = np.sin(0.5 * math.pi * np.log2(4.0 * t)) ** 2
-    return window
+    return np.sin(0.5 * math.pi * np.log2(4.0 * t)) ** 2
 
 
 def spike_profile(
-    wings: BladeWings,
-    wavelengths_nm: Floats,
-    weights: Floats,
-    f_number: float,
-    pixel_mm: tuple[float, float],
+    wings: BladeWings, wavelengths_nm: Floats, weights: Floats, f_number: float, pixel_mm: tuple[float, float]
 ) -> SpikeProfile:
     """Return the profile across the spikes of straight blades, summed over wavelengths and averaged over a pixel.
 

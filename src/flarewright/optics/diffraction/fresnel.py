@@ -16,14 +16,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernels.diffraction.fresnel import (
-    BandAreas,
-    FrequencyLimits,
-    PhaseTables,
-    sharpen,
-    sum_turns,
-    turn_frequencies,
-)
+from ...kernels.diffraction.fresnel import BandAreas, FrequencyLimits, PhaseTables, sharpen, sum_turns, turn_frequencies
 from ...typing import Floats, Pixels
 from .fft_size import fast_size
 
@@ -68,20 +61,6 @@ wave by 0.7 % there, where it has faded out, and by a fourth of that where the f
 # f^2 lambda L at the end of the fade, and steps per unit of it
 _END = 0.5 * FADE[1] ** 2
 _TO_STEP = (TURN_STEPS**2 - 1) / _END
-
-__all__ = [
-    "FADE",
-    "REACH",
-    "SHADOW",
-    "Box",
-    "FresnelGrid",
-    "band_pattern",
-    "crop",
-    "ending",
-    "fresnel_grid",
-    "fresnel_intensity",
-    "halved_pattern",
-]
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ import numpy as np
 from flarewright.errors import GlassError
 from flarewright.model import Dispersion, Medium
 
+from ...colorimetry import VISIBLE_NM
 from ...typing import Floats
 
 LINE_D_NM = 587.56
 
 # limits of extrapolation: a little beyond the maker's range, and visible light in any case
 _STRETCH = 0.15
-_VISIBLE_NM = (360.0, 830.0)
 
 
 def refractive_index(medium: Medium | None, wavelength_nm: Floats | float) -> Floats:
@@ -89,8 +89,8 @@ def dispersion_index(dispersion: Dispersion, wavelength_nm: Floats | np.float64)
 
 def _check_range(dispersion: Dispersion, wavelength_nm: Floats) -> None:
     low, high = dispersion.range_nm
-    low = min(low * (1.0 - _STRETCH), _VISIBLE_NM[0])
-    high = max(high * (1.0 + _STRETCH), _VISIBLE_NM[1])
+    low = min(low * (1.0 - _STRETCH), VISIBLE_NM[0])
+    high = max(high * (1.0 + _STRETCH), VISIBLE_NM[1])
     if wavelength_nm.size and not bool(np.all((wavelength_nm >= low) & (wavelength_nm <= high))):
         raise GlassError(
             f"{dispersion.glass} is known from {dispersion.range_nm[0]:g} to {dispersion.range_nm[1]:g} nm, "

@@ -18,8 +18,6 @@ from ...typing import Floats
 POWERS = {"f_number": -2, "iso": 1, "exposure_s": 1, "luminance_cd_m2": 1, "solid_angle_sr": 1}
 """Exponent of each setting in the brightness."""
 
-__all__ = ["POWERS", "brightness_scale", "constellation_and_roll", "field_angles", "view_axes"]
-
 
 def view_axes(forward: ArrayLike, up: ArrayLike) -> Floats:
     """Return the axes of a camera's view.

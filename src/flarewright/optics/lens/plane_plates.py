@@ -33,8 +33,7 @@ def with_filter(lens: Lens, plate: Plate, medium: Medium) -> Lens:
     faces = _faces(plate, medium, FILTER_GAP if plate.gap is None else plate.gap)
     moved = tuple(element.replace(rows=(element.rows[0] + 2, element.rows[1] + 2)) for element in lens.elements)
     presets = {name: (plate.coating, plate.coating, *rows) for name, rows in lens.coating_presets.items()}
-    found: Lens = lens.replace(rows=(*faces, *lens.rows), elements=moved, coating_presets=presets)
-    return found
+    return lens.replace(rows=(*faces, *lens.rows), elements=moved, coating_presets=presets)
 
 
 def with_cover_glass(
@@ -85,7 +84,6 @@ def with_cover_glass(
     last = lens.rows[-1].replace(thickness=room)
     faces = _faces(plate, medium, 0.0)
     presets = {name: (*rows, plate.coating, plate.coating) for name, rows in lens.coating_presets.items()}
-    found: Lens = lens.replace(
+    return lens.replace(
         rows=(*lens.rows[:-1], last, *faces), coating_presets=presets, sensor_distance=gap or None, focus_distance=None
     )
-    return found

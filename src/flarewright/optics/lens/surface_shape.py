@@ -65,8 +65,7 @@ def ideal(lens: Lens) -> Lens:
     rows = [
         row.replace(decentre=None, tilt_deg=None, figure=None) if isinstance(row, Surface) else row for row in lens.rows
     ]
-    found: Lens = lens.replace(rows=tuple(rows), elements=())
-    return found
+    return lens.replace(rows=tuple(rows), elements=())
 
 
 def transposed(lens: Lens) -> Lens:
@@ -76,12 +75,10 @@ def transposed(lens: Lens) -> Lens:
         if not (isinstance(row, Surface) and row.toroidal):
             return row
         curvature, conic = row.meridian_x
-        found: Surface = row.replace(curvature=curvature, conic=conic, curvature_x=row.curvature, conic_x=row.conic)
-        return found
+        return row.replace(curvature=curvature, conic=conic, curvature_x=row.curvature, conic_x=row.conic)
 
     plain = ideal(lens)
-    found: Lens = plain.replace(rows=tuple(exchange(row) for row in plain.rows))
-    return found
+    return plain.replace(rows=tuple(exchange(row) for row in plain.rows))
 
 
 def sag(row: Surface | Stop, x: Floats, y: Floats) -> Floats:

@@ -78,8 +78,7 @@ def imperfect(lens: Lens, sample: Imperfection | None) -> Lens:
         changes["rows"] = tuple(
             _polished(row, k, sample) if isinstance(row, Surface) else row for k, row in enumerate(lens.rows)
         )
-    found: Lens = lens.replace(**changes)
-    return found
+    return lens.replace(**changes)
 
 
 def _moved(group: tuple[int, int], number: int, sample: Imperfection) -> Element:
@@ -101,8 +100,7 @@ def _polished(row: Surface, k: int, sample: Imperfection) -> Surface:
     for term, amplitude in zip(TERMS, amplitudes, strict=True):
         total[term] = total.get(term, 0.0) + float(amplitude)
     figure = row.figure if row.figure is not None else Figure()
-    found: Surface = row.replace(figure=figure.replace(zernike_nm=tuple(total.items())))
-    return found
+    return row.replace(figure=figure.replace(zernike_nm=tuple(total.items())))
 
 
 def ghost_offset(path: LightPath, sample: Imperfection | None) -> tuple[float, float]:

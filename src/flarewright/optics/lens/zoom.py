@@ -41,8 +41,7 @@ def at_position(lens: Lens, position: Position) -> Lens:
         # a position without a distance then means infinity, whatever the focus of the rows
         changes["focus_distance"] = position.focus_distance
     changes["stated_focal_length"] = position.focal_length
-    found: Lens = lens.replace(**changes)
-    return found
+    return lens.replace(**changes)
 
 
 def positioned(lens: Lens, zoom: str | float | None, distance: float | None) -> Lens:
@@ -141,8 +140,7 @@ def _focused(lens: Lens, setting: Sequence[Position], distance: float | None) ->
     for one, other in pairwise(setting):
         if near <= _nearness(other) * (1.0 + 1e-9):
             part = (near - _nearness(one)) / (_nearness(other) - _nearness(one))
-            found: Position = interpolated_position(lens, one, other, part).replace(focus_distance=distance)
-            return found
+            return _interpolated_position(lens, one, other, part).replace(focus_distance=distance)
     return setting[0]
 
 
@@ -163,8 +161,7 @@ def _between(lens: Lens, focal_length: float, distance: float | None) -> Positio
         if number <= above:
             part = _part(lens, settings[a][0], settings[b][0], number)
             one, other = _focused(lens, settings[a], distance), _focused(lens, settings[b], distance)
-            met: Position = interpolated_position(lens, one, other, part).replace(focal_length=number)
-            return met
+            return _interpolated_position(lens, one, other, part).replace(focal_length=number)
     return _focused(lens, settings[0], distance)
 
 
@@ -175,7 +172,7 @@ def _part(lens: Lens, one: Position, other: Position, focal_length: float) -> fl
     for _ in range(STEPS):
         part = 0.5 * (low + high)
         try:
-            efl = first_order(at_position(lens, interpolated_position(lens, one, other, part))).efl
+            efl = first_order(at_position(lens, _interpolated_position(lens, one, other, part))).efl
         except LensError:
             raise ProjectError(
                 f"{lens.name} forms no image on the straight path between its positions {one.name!r} and "
@@ -187,22 +184,8 @@ def _part(lens: Lens, one: Position, other: Position, focal_length: float) -> fl
     return part
 
 
-def interpolated_position(lens: Lens, one: Position, other: Position, part: float) -> Position:
-    """Return the position at a fraction between two positions.
-
-    Parameters
-    ----------
-    lens : Lens
-        Gives f-number and field where a position has none.
-    one, other : Position
-    part : float
-        0 is `one`, 1 is `other`.
-
-    Returns
-    -------
-    Position
-        With the focus distance of `one`.
-    """
+def _interpolated_position(lens: Lens, one: Position, other: Position, part: float) -> Position:
+    """Return the position at a fraction between two, 0 and 1, with the focus distance of the first."""
     there = dict(other.gaps)
     gaps = tuple((row, gap + part * (there[row] - gap)) for row, gap in one.gaps)
 

@@ -21,6 +21,7 @@ from ...typing import Floats
 from ..lens.paraxial import FirstOrder, first_order, path_matrices
 from ..lens.paths import direct_path
 from ..rays.single_rays import trace_polylines
+from .sequential_import import order_of
 
 Apertures = Literal["auto", "diameters", "semi-diameters"]
 
@@ -72,7 +73,7 @@ def repair(raw: RawLens, apertures: Apertures = "auto") -> LensReading:
     rows = _without_idle_rows(raw, remarks)
     name = _full_name(raw, remarks)
     draft = _draft(raw, rows, name)
-    order = _first_order(raw, draft)
+    order = order_of(raw.file, draft)
     per_mm, order, draft = _read_apertures(raw, rows, draft, order, apertures, remarks)
     faults = _contradictions(raw, rows, order, remarks)
     if faults > 1 or (faults and abs(_stop_ratio(rows, order) * 2.0 * per_mm - 1.0) > STOP_OFF):
@@ -150,13 +151,6 @@ def _check_positive_focal_length(raw: RawLens) -> None:
             f"{raw.file}: its focal length is negative ({1.0 / power:.2f} mm): a tele-converter that works only "
             "behind another lens"
         )
-
-
-def _first_order(raw: RawLens, draft: Lens) -> FirstOrder:
-    try:
-        return first_order(draft)
-    except LensError as error:
-        raise LensError(f"{raw.file}: {str(error).removeprefix(f'{draft.name}: ')}") from None
 
 
 def _without_idle_rows(raw: RawLens, remarks: list[str]) -> list[RawRow]:

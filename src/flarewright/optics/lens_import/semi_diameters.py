@@ -66,8 +66,7 @@ def with_semi_diameters(lens: Lens) -> Lens:
         radius = float(min(needed[k], WITHIN_SPHERE * row.equator, WIDEST))
         rows[k] = row.replace(semi_diameter=radius, semi_diameter_estimated=True)
     _separate_neighbours(rows, set(missing), EDGE * first_order(ideal(lens)).stop_semi_diameter)
-    completed: Lens = lens.replace(rows=tuple(rows))
-    return completed
+    return lens.replace(rows=tuple(rows))
 
 
 def _required_heights(lens: Lens) -> Floats:

@@ -45,7 +45,7 @@ def lens_of_sequence(raw: RawSequence) -> LensReading:
     kept, front = _without_idle(raw, remarks)
     rows = _with_stop(raw, kept, remarks)
     draft = Lens(name=raw.name, source=f"from {raw.file}", f_number=TRIAL, rows=tuple(rows))
-    order = _order(raw, draft)
+    order = order_of(raw.file, draft)
     f_number = _f_number(raw, order, remarks)
     if not LEAST_F_NUMBER < f_number <= LARGEST_F_NUMBER:
         raise LensError(f"{raw.file}: its f-number would be f/{f_number:.3g}, out of range for a lens: set FNUM")
@@ -83,7 +83,7 @@ def _settings(raw: RawSequence, remarks: list[str]) -> Iterator[Setting]:
             kept, front = _without_idle(moved, [])
             distance = None if one.focus_distance is None else one.focus_distance + front
             rows = tuple(_with_stop(moved, kept, []))
-            order = _order(moved, Lens(name=raw.name, f_number=TRIAL, focus_distance=distance, rows=rows))
+            order = order_of(moved.file, Lens(name=raw.name, f_number=TRIAL, focus_distance=distance, rows=rows))
             yield Setting(
                 number=one.number, rows=rows, efl=order.efl, f_number=_f_number(moved, order, []),
                 field_deg=_field_deg(moved, order), focus_distance=distance,
@@ -148,11 +148,12 @@ def _with_stop(raw: RawSequence, kept: list[SequenceRow], remarks: list[str]) ->
     return rows
 
 
-def _order(raw: RawSequence, draft: Lens) -> FirstOrder:
+def order_of(file: str, draft: Lens) -> FirstOrder:
+    """Return the first-order data of a draft; its errors name the file."""
     try:
         return first_order(draft)
     except LensError as error:
-        raise LensError(f"{raw.file}: {str(error).removeprefix(f'{draft.name}: ')}") from None
+        raise LensError(f"{file}: {str(error).removeprefix(f'{draft.name}: ')}") from None
 
 
 def _f_number(raw: RawSequence, order: FirstOrder, remarks: list[str]) -> float:

@@ -9,8 +9,6 @@ import numpy as np
 
 from ...typing import Floats
 
-__all__ = ["BladeForm", "blade_form", "to_corner"]
-
 
 @dataclass(frozen=True)
 class BladeForm:

@@ -34,8 +34,6 @@ _RAGGED_STEP = 2.0
 # order of a scratch's fringes beyond which none remain
 _LAST_ORDER = 6.0
 
-__all__ = ["Elements", "Veil", "VeilTerm", "generate_dirt", "rasterise", "scattered", "spread_area"]
-
 
 @dataclass(frozen=True)
 class Elements:

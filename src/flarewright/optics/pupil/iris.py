@@ -15,8 +15,6 @@ from flarewright.model.lens.iris import Iris
 
 from ...typing import Floats
 
-__all__ = ["blade_edges", "coverage", "iris_outline", "resampled", "softened", "transmission"]
-
 
 def blade_edges(iris: Iris, semi_diameter: float) -> Floats:
     """Return the blades of the opening as implicit functions.
@@ -84,8 +82,7 @@ def iris_outline(iris: Iris, semi_diameter: float, points: int = 180) -> Floats:
     edges = blade_edges(iris, semi_diameter)
     if len(edges) == 1:
         turn = 2.0 * np.pi * np.arange(points) / points
-        circle: Floats = semi_diameter * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-        return circle
+        return semi_diameter * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     B = len(edges)
     each = -(-points // B)
     half = math.pi / B
@@ -256,8 +253,7 @@ def _ray_length(cosine: Floats | float, k: float) -> Floats:
     The positive root of k/2 rho^2 + (1 - k) cos rho - (1 - k/2) = 0, in a form without a special case for k = 0.
     """
     b = (1.0 - k) * np.asarray(cosine, dtype=np.float64)
-    length: Floats = (2.0 - k) / (b + np.sqrt(b * b + k * (2.0 - k)))
-    return length
+    return (2.0 - k) / (b + np.sqrt(b * b + k * (2.0 - k)))
 
 
 def _area_of_unit_apothem(blades: int, k: float) -> float:

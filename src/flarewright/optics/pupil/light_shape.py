@@ -37,11 +37,6 @@ class Part:
     share: float
     corners: Floats
 
-    @property
-    def slope(self) -> Floats:
-        """The slopes of the centroid, shape (2,)."""
-        return np.tan(np.radians(self.field_deg))
-
 
 def light_outline(light: Light) -> Floats | None:
     """Return the outline of a light.

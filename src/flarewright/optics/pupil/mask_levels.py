@@ -12,8 +12,6 @@ MaskLevels = tuple[Pixels, Floats, Indices]
 # least number of samples per side of a level
 FEWEST = 4
 
-__all__ = ["MaskLevels", "mask_levels"]
-
 
 def mask_levels(mask: Floats, half: float) -> MaskLevels:
     """Build the resolution pyramid of a mask.

@@ -15,8 +15,6 @@ FINEST = 64
 # differences of transmittance below this are invisible
 SAME = 1e-6
 
-__all__ = ["FINEST", "hidden_part", "visible_shape"]
-
 
 def hidden_part(hidden: NDArray[np.floating], place: Floats) -> float:
     """Return how much an image hides of a point.

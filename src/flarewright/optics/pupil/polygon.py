@@ -14,21 +14,6 @@ from ...typing import Floats
 # columns of an edge: start, end, and weight
 START, END, WEIGHT = slice(0, 2), slice(2, 4), 4
 
-__all__ = [
-    "END",
-    "START",
-    "WEIGHT",
-    "backward",
-    "centroid",
-    "closed",
-    "content",
-    "mapped",
-    "points",
-    "rim",
-    "shape_brightness",
-    "solid_angle",
-]
-
 
 def closed(corners: Floats) -> Floats:
     """Return the border of a polygon.
@@ -94,8 +79,7 @@ def content(border: Floats) -> float:
 def centroid(border: Floats) -> Floats:
     """Return the centroid of a shape's brightness, shape (2,)."""
     weight = _cross(border) * border[:, WEIGHT]
-    middle: Floats = weight @ (border[:, START] + border[:, END]) / (6.0 * content(border))
-    return middle
+    return weight @ (border[:, START] + border[:, END]) / (6.0 * content(border))
 
 
 def rim(border: Floats) -> float:

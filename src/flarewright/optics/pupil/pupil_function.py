@@ -23,8 +23,6 @@ WINDOW = 12.0
 PUPIL_REACH = 1.65
 """Largest radius of an opening: the corner of a straight triangle is at 1.56."""
 
-__all__ = ["FFT_SIZE", "PUPIL_REACH", "WINDOW", "Pupil", "PupilImage", "pupil_amplitude"]
-
 
 @dataclass(frozen=True)
 class PupilImage:

@@ -168,12 +168,7 @@ def pack_for_query(lens: Lens, order: FirstOrder, coating: CoatingChoice, query:
 
 
 def ghost_table(
-    lens: Lens,
-    packed: PackedLens,
-    query: GhostQuery,
-    *,
-    others: Sequence[LightPath] = (),
-    threads: int | None = None,
+    lens: Lens, packed: PackedLens, query: GhostQuery, *, others: Sequence[LightPath] = (), threads: int | None = None
 ) -> GhostTable:
     """Analyse all two-reflection ghosts of a lens for one light, and the given paths of four reflections.
 

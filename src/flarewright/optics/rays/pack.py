@@ -319,12 +319,7 @@ def facing(packed: PackedLens, axes: Floats, nearness: float = 0.0) -> PackedLen
     return replace(packed, faced=seen_along(packed.shapes, axes), nearness=nearness)
 
 
-def _reflectance(
-    lens: Lens,
-    coatings: tuple[Coating | None, ...],
-    n_gap: Floats,
-    wavelengths_nm: Floats,
-) -> Floats:
+def _reflectance(lens: Lens, coatings: tuple[Coating | None, ...], n_gap: Floats, wavelengths_nm: Floats) -> Floats:
     n_d = gap_indices(lens, D_LINE_NM)
     table = np.zeros((len(wavelengths_nm), len(lens.rows), REFLECTANCE_SAMPLES))
     for k, row in enumerate(lens.rows):

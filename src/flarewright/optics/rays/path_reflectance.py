@@ -13,13 +13,14 @@ from functools import cache, cached_property, lru_cache
 
 import numpy as np
 
+from ...colorimetry import VISIBLE_NM
 from ...kernels.paraxial.path_reflectance import path_throughput, throughput_between
 from ...kernels.tracing.representative_rays import traced_squares
 from ...model import Coating, Lens, Medium, Stop
 from ...model.project.light import Spectrum
 from ...typing import Floats, Indices
 from ..coatings.thin_film import film_stack, stack_reflectance
-from ..colour.spectrum import VISIBLE_NM, band_shares, cubics
+from ..colour.spectrum import band_shares, cubics
 from ..lens.dispersion import refractive_index
 from ..lens.paraxial import D_LINE_NM, gap_indices
 from ..lens.paths import LightPath
@@ -35,21 +36,6 @@ CURVE_NM = np.concatenate([
 
 COSINES = 65
 """Samples of a curve over the cosine of incidence; a line between them errs by 6e-5 of R at most up to 60 degrees."""
-
-__all__ = [
-    "COSINES",
-    "CURVE_NM",
-    "BandCurves",
-    "CoatingCurves",
-    "PathSpectrum",
-    "band_curves",
-    "coating_curves",
-    "joined_steps",
-    "path_products",
-    "path_spectra",
-    "products_between",
-    "step_squares",
-]
 
 
 # compared by identity: the cache (`_stacked`) returns one object for equal coatings
@@ -236,30 +222,11 @@ def path_spectra(curves: BandCurves, paths: Sequence[LightPath], squares: Floats
     PathSpectrum
         Of all paths; means over the rays.
     """
-    through = path_products(curves.reflectance, paths, squares)
-    return PathSpectrum(through[:, : len(CURVE_NM)], through[:, len(CURVE_NM) :])
-
-
-def path_products(reflectance: Floats, paths: Sequence[LightPath], squares: Floats) -> Floats:
-    """Multiply R and T along paths.
-
-    Parameters
-    ----------
-    reflectance : ndarray, shape (K, COSINES, M)
-        Any columns of `BandCurves.reflectance`.
-    paths, squares
-        As in `path_spectra`.
-
-    Returns
-    -------
-    ndarray, shape (P, M)
-        Means over the rays.
-    """
-    through = np.empty((len(paths), reflectance.shape[2]))
+    through = np.empty((len(paths), curves.reflectance.shape[2]))
     path_throughput(
-        np.ascontiguousarray(reflectance), *joined_steps(tuple(paths)), np.ascontiguousarray(squares), through
+        np.ascontiguousarray(curves.reflectance), *joined_steps(tuple(paths)), np.ascontiguousarray(squares), through
     )
-    return through
+    return PathSpectrum(through[:, : len(CURVE_NM)], through[:, len(CURVE_NM) :])
 
 
 def products_between(

@@ -19,8 +19,6 @@ LEAST_PART = 1e-3
 # the error is estimated at every third wavelength
 EVERY = 3
 
-__all__ = ["bright_wavelengths", "gap_errors", "interpolation_error", "throughput_ratios"]
-
 
 def interpolation_error(
     passed: Floats, light: Floats, known_nm: Floats, throughput: Floats, traced: Mask | None = None

@@ -25,13 +25,6 @@ RINGS, SPOKES = 160, 32
 # indices that differ by less belong to the same glass
 SAME_INDEX = 1e-9
 
-__all__ = [
-    "ScatterTables",
-    "abg_density",
-    "roughness_density",
-    "scatter_tables",
-]
-
 
 def roughness_density(v: ArrayLike, wavelength_nm: float, correlation_um: float, slope: float) -> Floats:
     """Return the distribution of a rough surface's scatter over v, per area of v.
@@ -58,8 +51,7 @@ def roughness_density(v: ArrayLike, wavelength_nm: float, correlation_um: float,
     shoulder = 1e-3 * wavelength_nm / (2.0 * np.pi * correlation_um)
     m = 0.5 * slope
     ratio = np.asarray(v, dtype=np.float64) / shoulder
-    density: Floats = (m - 1.0) / (np.pi * shoulder**2) * (1.0 + ratio**2) ** -m
-    return density
+    return (m - 1.0) / (np.pi * shoulder**2) * (1.0 + ratio**2) ** -m
 
 
 def abg_density(v: ArrayLike, abg: tuple[float, float, float]) -> Floats:
@@ -81,8 +73,7 @@ def abg_density(v: ArrayLike, abg: tuple[float, float, float]) -> Floats:
     cos(theta) dOmega, which is the area of v.
     """
     a, b, g = abg
-    density: Floats = a / (b + np.asarray(v, dtype=np.float64) ** g)
-    return density
+    return a / (b + np.asarray(v, dtype=np.float64) ** g)
 
 
 @dataclass(frozen=True)

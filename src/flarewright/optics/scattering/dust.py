@@ -20,8 +20,6 @@ SLOPE = 0.926
 SIZES, SMALLEST, LARGEST = 180, 3.0, 6000.0
 ANGLES, FIRST_V, PER_ANGLE = 40, 2e-4, 6
 
-__all__ = ["dust_density", "particles_above"]
-
 
 def particles_above(diameter_um: Floats, level: float) -> Floats:
     """Return the number of particles at least as large as a diameter, up to a cleanliness level, on 1 mm^2.
@@ -69,8 +67,7 @@ def dust_density(v: ArrayLike, wavelength_nm: float, level: float) -> Floats:
         density[m] = (number * np.exp(np.interp(at, sizes, spread[:, m]))).sum() / k2
     smooth = _smoothed(np.log(nodes), np.log(density))
     place = np.log(np.clip(np.asarray(v, dtype=np.float64), nodes[0], nodes[-1]))
-    found: Floats = np.exp(np.interp(place, np.log(nodes), smooth))
-    return found
+    return np.exp(np.interp(place, np.log(nodes), smooth))
 
 
 @lru_cache(maxsize=1)

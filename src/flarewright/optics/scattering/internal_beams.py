@@ -27,8 +27,6 @@ DEGREE, FEWEST = 4, 40
 # size of the tabulated area relative to the rim
 ROOM = 1.06
 
-__all__ = ["Beams", "trace_beams"]
-
 
 @dataclass(frozen=True)
 class Beams:

@@ -10,8 +10,6 @@ from ...model.lens.grating import SensorGrating
 from ...typing import Floats, Indices
 from ..rays.pack import PackedLens
 
-__all__ = ["GratingOrder", "grating_orders", "order_efficiency", "return_trip"]
-
 FAINTEST = 1e-4
 """Orders below this fraction of the strongest are omitted."""
 

@@ -17,25 +17,21 @@ from ..rays.pack import PackedLens
 # rays per side of three grids: to find the transmitting part of the last surface, within it, and for the direct path
 COARSE, FINE, DIRECT = 48, 64, 256
 
-__all__ = ["from_surround", "object_nearness"]
 
-
-def object_nearness(packed: PackedLens, lens: Lens, w: int = 0) -> float:
-    """Return the reciprocal object distance of the plane in focus, by matrices.
+def object_nearness(packed: PackedLens, lens: Lens) -> float:
+    """Return the reciprocal object distance of the plane in focus, by matrices, at the first packed wavelength.
 
     Parameters
     ----------
     packed : PackedLens
     lens : Lens
-    w : int
-        Index of a packed wavelength.
 
     Returns
     -------
     float
         1 / distance in front of the first vertex, 1/mm; 0 for infinity, or for a plane behind the camera.
     """
-    total, n = np.eye(2), packed.n_gap[w]
+    total, n = np.eye(2), packed.n_gap[0]
     count = len(lens.rows)
     for k in range(count):
         bend = np.array([[1.0, 0.0], [(n[k] - n[k + 1]) * packed.curvature[k] / n[k + 1], n[k] / n[k + 1]]])
@@ -47,15 +43,9 @@ def object_nearness(packed: PackedLens, lens: Lens, w: int = 0) -> float:
 
 
 def from_surround(
-    lens: Lens,
-    packed: PackedLens,
-    paths: Sequence[LightPath],
-    patch: float,
-    *,
-    w: int = 0,
-    threads: int | None = None,
+    lens: Lens, packed: PackedLens, paths: Sequence[LightPath], patch: float, *, threads: int | None = None
 ) -> Floats:
-    """Integrate a uniform surround over each path to the centre of the sensor.
+    """Integrate a uniform surround over each path to the centre of the sensor, at the first packed wavelength.
 
     Parameters
     ----------
@@ -66,8 +56,6 @@ def from_surround(
         The direct path, or ghosts.
     patch : float
         Radius of a black patch on the axis over its distance.
-    w : int
-        Index of a packed wavelength.
     threads : int, optional
         None: all cores; results do not depend on it.
 
@@ -76,7 +64,7 @@ def from_surround(
     ndarray, shape (len(paths), 2)
         Irradiance per radiance: of the whole surround, and of the surround without the patch. The stop is round.
     """
-    nearness = object_nearness(packed, lens, w)
+    nearness = object_nearness(packed, lens)
     last = len(lens.rows) - 1
     plane_z = float(packed.z_vertex[last])
     # a rim lies off its vertex plane, so slightly more of that plane is visible through it
@@ -89,7 +77,7 @@ def from_surround(
         for rays in (COARSE, side):
             light_from_surround(
                 path.rows, path.actions, packed.curvature, packed.form, packed.z_vertex, packed.inv_semi,
-                packed.n_gap[w], packed.reflectance[w], packed.sensor_z, packed.stop_semi, plane_z, box, rays,
+                packed.n_gap[0], packed.reflectance[0], packed.sensor_z, packed.stop_semi, plane_z, box, rays,
                 nearness, patch, sums,
             )  # fmt: skip
             if sums[ALL] <= 0.0:

@@ -575,10 +575,7 @@ def _collect(
 
 
 def _in_turn(
-    pool: ThreadPoolExecutor,
-    work: Callable[[list[int]], list[Plane | None]],
-    items: Sequence[list[int]],
-    ahead: int,
+    pool: ThreadPoolExecutor, work: Callable[[list[int]], list[Plane | None]], items: Sequence[list[int]], ahead: int
 ) -> Iterator[list[Plane | None]]:
     """Work in parallel and return the results in order; at most `ahead` of them are in memory or in the making."""
     waiting: deque[Future[list[Plane | None]]] = deque()

@@ -356,8 +356,7 @@ def _nearly_total(paths: Sequence[LightPath], angles: Floats) -> Mask:
 def _largest(paths: Sequence[LightPath], action: int, angles: Floats) -> Floats:
     """Return the largest of the angles, (W, steps), at which each path is refracted or reflected, (W, P)."""
     _, actions, starts = joined_steps(tuple(paths))
-    largest: Floats = np.maximum.reduceat(np.where(actions == action, angles, 0.0), starts[:-1], axis=1)
-    return largest
+    return np.maximum.reduceat(np.where(actions == action, angles, 0.0), starts[:-1], axis=1)
 
 
 def matrix_fluxes(

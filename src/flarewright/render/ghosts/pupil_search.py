@@ -12,12 +12,12 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from ...optics.lens.paths import LightPath
-from ...optics.rays.pupil_region import Region, first_look, front_box, join_boxes
+from ...optics.rays.pupil_region import Region, find_region, first_look, front_box, join_boxes
 from ...typing import Floats
 from ..scene.art_rules import PLAIN, PathArt
 from ..scene.shot import Shot
 from .final_pass import FinalPass
-from .traced_ghosts import find_entry, find_final
+from .traced_ghosts import find_final
 
 # largest difference in field angle of two lights whose regions bound those of the lights between
 STEP_RAD = np.radians(0.5)
@@ -29,8 +29,6 @@ MOST_GROWTH = 3.0
 LEAST_LIGHTS = 8
 # largest number of paths traced together to their common first mirror; rays of more do not fit the processor's cache
 GROUP_SIZE = 8
-
-__all__ = ["ghost_search", "group_by_mirror"]
 
 
 def group_by_mirror(paths: Sequence[LightPath]) -> list[list[LightPath]]:
@@ -79,7 +77,10 @@ def ghost_search(
     """
     # paths whose mirrors all lie behind the stop share the way to the stop
     entry_path = next((path.entry for path in paths if path.entry is not None), None)
-    entries = [None if entry_path is None else find_entry(shot, entry_path) for shot in shots]
+    entries = [
+        None if entry_path is None else find_region(shot.packed, entry_path, shot.incidence.tilt, shot.opening.radius)
+        for shot in shots
+    ]
     rows = _rows(shots)
 
     def search_path(

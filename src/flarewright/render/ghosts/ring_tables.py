@@ -97,7 +97,7 @@ class EdgeCrossing:
     def _piece(self, scale: float, spread: float) -> Piece:
         tables = averaged(self.form, scale, spread, self.pixel_mm / scale)
         margin = len(tables.profile) // 2 / PROFILE_SAMPLES
-        return edge_piece(self.form, tables, scale, margin * scale, gain(self.form, scale, tables))
+        return _edge_piece(self.form, tables, scale, margin * scale, gain(self.form, scale, tables))
 
 
 def table_obstacle(lights: Sequence[Light], *, image: bool) -> str | None:
@@ -145,27 +145,11 @@ def edge_crossing(form: BladeForm, wavelengths_nm: Floats, area: Floats, pixel_m
 def sharp_piece(form: BladeForm, width: float) -> Piece:
     """Return the opening itself as a piece, with a border `width` mm wide."""
     scale = CORNER_SAMPLES * width
-    return edge_piece(form, sharp_tables(), scale, scale)
+    return _edge_piece(form, sharp_tables(), scale, scale)
 
 
-def edge_piece(form: BladeForm, tables: EdgeTables, scale: float, margin: float, brighter: float = 1.0) -> Piece:
-    """Arrange edge tables for the kernel.
-
-    Parameters
-    ----------
-    form : BladeForm
-    tables : EdgeTables
-    scale : float
-        Unit of the tables, mm.
-    margin : float
-        Distance from the border up to which the tables are valid, mm.
-    brighter : float
-        Gain of the piece.
-
-    Returns
-    -------
-    Piece
-    """
+def _edge_piece(form: BladeForm, tables: EdgeTables, scale: float, margin: float, brighter: float = 1.0) -> Piece:
+    """Arrange edge tables, of unit `scale` mm and valid up to `margin` mm from the border, for the kernel."""
     (rows, across), samples = tables.corner.shape, CORNER_SAMPLES / scale
     row = [0.0] * columns.TABLE_COLUMNS
     row[columns.ROWS], row[columns.COLUMNS] = rows, across

@@ -60,19 +60,6 @@ ROOTS, SHARES = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 # rounding error of a sum of weights that is 1
 ROUNDING = 1e-9
 
-__all__ = [
-    "bent_spectrum",
-    "bent_weights",
-    "ends",
-    "gaps_at_ends",
-    "light_up_to_its_end",
-    "over",
-    "steep_gaps",
-    "steep_paths",
-    "steepness",
-    "within_gaps",
-]
-
 
 def steepness(
     shot: Shot, bundle: Bundle, spectrum: PathSpectrum | None, to_pixels: Floats
@@ -356,8 +343,7 @@ def within_gaps(fine_nm: Floats, gaps: Mask) -> NDArray[np.intp]:
     gaps : ndarray, shape (M - 1,), bool
     """
     inner, gap = _inner_wavelengths(tuple(fine_nm))
-    found: NDArray[np.intp] = inner[gaps[gap]]
-    return found
+    return inner[gaps[gap]]
 
 
 @lru_cache(maxsize=64)

@@ -126,22 +126,6 @@ def find_final(
     return FinalPass(shot, path, region, to_pixels, view_radius, art, frame, source, detail, orders)
 
 
-def find_entry(shot: Shot, way_in: LightPath) -> Region | None:
-    """Find the part of the pupil whose light reaches the stop, or None when nothing does.
-
-    Parameters
-    ----------
-    shot : Shot
-    way_in : LightPath
-        `LightPath.entry` of any path that has one.
-
-    Returns
-    -------
-    Region or None
-    """
-    return find_region(shot.packed, way_in, shot.incidence.tilt, shot.opening.radius)
-
-
 def _frame(shot: Shot, path: LightPath, region: Region) -> Frame:
     """Measure centre and size of a ghost at the middle wavelength, on the unbounded sensor plane."""
     opening, tilt = shot.opening, shot.incidence.tilt

@@ -20,8 +20,6 @@ LEAST_PART = 0.1
 # largest part of rays with different visibility for which a wavelength can stand for another
 MOST_UNLIKE = 0.25
 
-__all__ = ["gathered_weights"]
-
 
 def gathered_weights(
     packed: PackedLens,

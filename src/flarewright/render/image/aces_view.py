@@ -14,8 +14,6 @@ from ...typing import Pixels
 # side of the cube, and the range of its axes in stops around 1
 _CUBE, _LOW, _HIGH = 40, -14.0, 12.0
 
-__all__ = ["aces_available", "aces_pixels"]
-
 
 def aces_available() -> bool:
     """Return whether opencolorio is installed."""

@@ -10,8 +10,6 @@ import numpy as np
 
 from ...model import Layer
 
-__all__ = ["apply_gamut", "compressed", "negative_share"]
-
 
 def apply_gamut(gamut: Literal["keep", "compress"], layers: Sequence[Layer]) -> list[Layer]:
     """Return layers as `Output.gamut` requires.

@@ -17,8 +17,6 @@ from ...optics.colour.rgb import luminance_weights
 from ...typing import Floats, Pixels
 from .compose import beauty
 
-__all__ = ["RANK_BYTES", "GhostRanking", "ghost_matte", "luminance_of", "rank_remarks"]
-
 RANK_BYTES = 8
 """Memory of one rank of a pixel."""
 

@@ -11,15 +11,14 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from ...colorimetry import PRIMARIES
 from ...errors import ProjectError
-from ...io.images.file_space import PRIMARIES, FileSpace
+from ...io.images.file_space import FileSpace
 from ...model import Layer, Project
 from ...model.project.camera import Colorspace
 from ...optics.colour.rgb import adapted_to_rgb_matrix, xyz_to_rgb_matrix
 from ...typing import Floats
 from .aces_view import aces_available
-
-__all__ = ["check_file_space", "config_digest", "config_name", "has_film_primaries", "in_file_space"]
 
 DEFAULT = "ocio://default"
 """The configuration that the library has built in."""
@@ -200,7 +199,6 @@ def _known(matrix: Floats) -> str | None:
     """Return the key of the primaries to which a matrix from linear Rec.709 leads; None if they are not known."""
     to_xyz = np.linalg.inv(xyz_to_rgb_matrix("rec709"))
     for name, xy in PRIMARIES.items():
-        r, g, b, white = ((xy[k], xy[k + 1]) for k in (0, 2, 4, 6))
-        if np.abs(adapted_to_rgb_matrix((r, g, b), white) @ to_xyz - matrix).max() < _SAME:
+        if np.abs(adapted_to_rgb_matrix(xy) @ to_xyz - matrix).max() < _SAME:
             return name
     return None

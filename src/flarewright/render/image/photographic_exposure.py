@@ -11,8 +11,6 @@ SUN_LUX = 100_000.0
 
 GREY = 0.18
 
-__all__ = ["SUN_LUX", "photographic_stops"]
-
 
 def photographic_stops(
     f_number: float, *, ev: float | None = None, shutter_s: float | None = None, iso: float = 100.0,

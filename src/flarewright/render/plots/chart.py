@@ -29,8 +29,6 @@ _DIGITS = 6
 # a smaller relative deviation is rounding error
 _ROUNDING = 1e-5
 
-__all__ = ["COLOURS", "Series", "chart", "number", "with_deviation"]
-
 
 @dataclass(frozen=True)
 class Series:

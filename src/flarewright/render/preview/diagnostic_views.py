@@ -72,6 +72,3 @@ def _simplified(shot: Shot, grey: bool, unclipped: bool) -> Shot:
         semi[packed.first_surface] = UNBOUNDED_MM
         packed = replace(packed, semi=semi)
     return replace(shot, packed=packed)
-
-
-__all__ = ["working_ghosts"]

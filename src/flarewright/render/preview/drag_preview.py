@@ -38,8 +38,6 @@ SMALL_DEG = 0.6
 each ghost over its disc takes several times as long as drawing it, and softens its edge by a few pixels. Starbursts of
 such discs are shifted as those of points: at another angle a disc's image is a few per cent longer."""
 
-__all__ = ["DragPicture", "DragStar", "StarburstCanvas", "moving_picture"]
-
 
 @dataclass(frozen=True)
 class StarburstCanvas:
@@ -206,8 +204,7 @@ def _has_fixed_patterns(project: Project) -> bool:
 
 def _scene(project: Project, light: Light) -> Project:
     placed = Light(field_deg=(0.0, 0.0), spectrum=light.spectrum, diameter_deg=light.diameter_deg)
-    scene: Project = project.replace(lights=(placed,), art=Art(physical=project.art.physical), design=None)
-    return scene
+    return project.replace(lights=(placed,), art=Art(physical=project.art.physical), design=None)
 
 
 def _strength(lens: Lens, shot: Shot, image: DirectImage) -> Floats:

@@ -233,12 +233,7 @@ def _points_within(border: Floats, count: int, rng: np.random.Generator) -> Floa
 
 
 def run_batch(
-    sources: Sequence[RaySource],
-    batch: int,
-    *,
-    picture: bool,
-    fours: int = 0,
-    cameras: Sequence[CameraSource] = (),
+    sources: Sequence[RaySource], batch: int, *, picture: bool, fours: int = 0, cameras: Sequence[CameraSource] = ()
 ) -> Batch:
     """Trace one batch of every light.
 
@@ -314,8 +309,7 @@ def _in_blocks(plane: Floats) -> Floats:
     """Sum a picture in blocks of 16 x 16 pixels; blocks at the right and lower edge can be smaller."""
     height, width = plane.shape
     rows = np.add.reduceat(plane, np.arange(0, height, BLOCK), axis=0)
-    blocks: Floats = np.add.reduceat(rows, np.arange(0, width, BLOCK), axis=1)
-    return blocks
+    return np.add.reduceat(rows, np.arange(0, width, BLOCK), axis=1)
 
 
 class Sums:
@@ -348,8 +342,7 @@ class Sums:
             return np.zeros(self.sums[name].shape)
         spread = self.squares[name] - self.sums[name] ** 2 / n
         # rounding can give small negative values if all batches are equal
-        variance: Floats = np.maximum(spread, 0.0) / (n * (n - 1.0))
-        return variance
+        return np.maximum(spread, 0.0) / (n * (n - 1.0))
 
 
 def batches_in_order(work: Callable[[int], Batch], first: int, threads: int) -> Generator[Batch, None, None]:

@@ -23,8 +23,6 @@ CIRCLES, DIRECTIONS, DISC_MARGIN = 17, 48, 1.01
 # number of strips into which a border is divided
 STRIPS = 64
 
-__all__ = ["CameraSource", "camera_source", "rear_disc", "run_camera"]
-
 
 @dataclass(frozen=True)
 class CameraSource:
@@ -78,7 +76,7 @@ def camera_source(
     to_pupil = distance + shot.packed.first_order.entrance_pupil_z if distance > 0.0 else 0.0
     bounds = np.array([*np.stack([ends.min(axis=0), ends.max(axis=0)], axis=1).ravel(), distance, to_pupil])
     in_strips, first = _in_strips(border)
-    points_of_batch = PicturePoints(count, rear_disc(shot))
+    points_of_batch = PicturePoints(count, _rear_disc(shot))
     return CameraSource(shot, points_of_batch, samples, chances, light, AreaLight(in_strips, bounds, first))
 
 
@@ -102,17 +100,8 @@ def _bright(shot: Shot) -> Floats:
     return border
 
 
-def rear_disc(shot: Shot) -> tuple[float, float]:
-    """Bound the last surface as seen from the picture: z of its vertex, and a radius in that plane, mm.
-
-    Parameters
-    ----------
-    shot : Shot
-
-    Returns
-    -------
-    tuple of float
-    """
+def _rear_disc(shot: Shot) -> tuple[float, float]:
+    """Bound the last surface as seen from the picture: z of its vertex, and a radius in that plane, mm."""
     packed = shot.packed
     # a reflecting sensor is a row too
     last = int(np.flatnonzero(packed.z_vertex < packed.sensor_z)[-1])

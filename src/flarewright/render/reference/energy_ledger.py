@@ -117,11 +117,7 @@ def ledger_of(sums: Sums) -> Ledger:
 
 
 def trace_ledger(
-    shots: Sequence[Shot],
-    seed: int,
-    *,
-    scatter: Sequence[ScatterTables] | None = None,
-    threads: int | None = None,
+    shots: Sequence[Shot], seed: int, *, scatter: Sequence[ScatterTables] | None = None, threads: int | None = None
 ) -> Ledger:
     """Compute the ledger of some lights with random rays, without a picture.
 

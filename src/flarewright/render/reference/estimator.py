@@ -246,20 +246,8 @@ def _digest(array: Floats | None) -> str | None:
     return None if array is None else hashlib.sha256(array.tobytes()).hexdigest()
 
 
-def relative_error(sums: Sums, of: str) -> float:
-    """Return the relative standard error of the ghosts in the picture.
-
-    Parameters
-    ----------
-    sums : Sums
-    of : {"total", "blocks"}
-        "total": of their whole flux. "blocks": mean standard error over mean flux of blocks of 16 x 16 pixels.
-
-    Returns
-    -------
-    float
-        Infinity until enough batches are finished; 0 if no ray met a ghost.
-    """
+def _relative_error(sums: Sums, of: str) -> float:
+    """Return `relative_spread`: infinity until enough batches are finished, 0 if no ray met a ghost."""
     if sums.batches < LEAST_BATCHES:
         return inf
     spread = relative_spread(sums, of)
@@ -273,7 +261,7 @@ def _most_batches(quality: Quality) -> float:
 
 def _done(sums: Sums, quality: Quality, run: ReferenceRun, begin: float) -> str:
     """Return the reason to stop, or an empty string."""
-    if relative_error(sums, quality.reference_error_of) <= quality.reference_error:
+    if _relative_error(sums, quality.reference_error_of) <= quality.reference_error:
         return "error"
     if sums.batches >= _most_batches(quality):
         return "samples"
@@ -284,7 +272,7 @@ def _done(sums: Sums, quality: Quality, run: ReferenceRun, begin: float) -> str:
 
 def _estimate(sums: Sums, quality: Quality, run: ReferenceRun, begin: float) -> tuple[float, str]:
     """Estimate the finished part from the condition that will end the run first."""
-    error = relative_error(sums, quality.reference_error_of)
+    error = _relative_error(sums, quality.reference_error_of)
     parts = [sums.batches / _most_batches(quality)]
     if error < inf:
         # the error falls with the square root of the number of rays
@@ -305,7 +293,7 @@ def _finish(
     names = (ORDER_2, ORDER_4, SCATTER)[: len(mean)]
     ledger = ledger_of(sums)
     flux, high = float(sums.mean("figures")[GHOSTS]) / kept, _share_of_high_orders(ledger)
-    errors = {of: relative_error(sums, of) for of in ("total", "blocks")}
+    errors = {of: _relative_error(sums, of) for of in ("total", "blocks")}
     facts = {
         "batches": sums.batches,
         "points": sums.batches * SIDE**2,

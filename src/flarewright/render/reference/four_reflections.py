@@ -132,11 +132,7 @@ def find_four_reflections(
 
 
 def find_four_reflections_unbounded(
-    lens: Lens,
-    packed: PackedLens,
-    query: GhostQuery,
-    *,
-    threads: int | None = None,
+    lens: Lens, packed: PackedLens, query: GhostQuery, *, threads: int | None = None
 ) -> FourReflections:
     """Search the four-reflection paths that bring light to an unbounded sensor plane, through a round stop.
 

@@ -25,8 +25,6 @@ LEAST_DEG = 3.0
 # for a light traced from the camera, the ledger uses this many times fewer points per axis from the light
 LEDGER_PART = 4
 
-__all__ = ["ReferenceRays", "reference_rays", "relative_spread"]
-
 
 @dataclass(frozen=True)
 class ReferenceRays:

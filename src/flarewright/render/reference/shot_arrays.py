@@ -10,8 +10,6 @@ from ...kernels.tracing.lens_arrays import LensArrays, ShapedLens
 from ...optics.rays.pack import PackedLens
 from ..scene.shot import Shot
 
-__all__ = ["shot_arrays"]
-
 
 def shot_arrays(shot: Shot) -> tuple[LensArrays, StopArrays, PictureFrame]:
     """Return lens, stop and picture of a shot as kernel arguments; random rays of all lights run in the lens' frame.

@@ -68,8 +68,6 @@ FINE = Sampling(16, 52, 24, 18)
 # a quarter of the time (docs/scatter.md)
 COARSE = Sampling(8, 36, 16, 12)
 
-__all__ = ["check_scatter", "chosen_scatter", "render_scatter", "scatter_facts", "scatter_of", "without_scattered"]
-
 
 def chosen_scatter(settled: ResolvedProject) -> Scatter | None:
     """Return the scatter settings of the project, or else of the lens file; None if nothing scatters."""
@@ -80,7 +78,7 @@ def chosen_scatter(settled: ResolvedProject) -> Scatter | None:
     if reported is None and settled.project.filter is not None and chosen.rows:
         # the lens file numbers its rows without those of the filter
         moved = tuple(exception.replace(row=exception.row + FILTER_ROWS) for exception in chosen.rows)
-        return chosen.replace(rows=moved)  # type: ignore[no-any-return]
+        return chosen.replace(rows=moved)
     return chosen
 
 
@@ -247,8 +245,7 @@ def _at_all(wavelengths_nm: Floats, chosen: NDArray[np.intp], light: Floats) -> 
     t = np.log(wavelengths_nm)
     weights = np.array([[np.prod([(at - t[m]) / (t[k] - t[m]) for m in chosen if m != k]) for k in chosen] for at in t])
     lit = (light > 0.0).all(axis=0)
-    found: Floats = np.where(lit, np.exp(weights @ np.log(np.where(lit, light, 1.0))), 0.0)
-    return found
+    return np.where(lit, np.exp(weights @ np.log(np.where(lit, light, 1.0))), 0.0)
 
 
 def _nodes(shot: Shot, centre: Floats, sampling: Sampling) -> tuple[Floats, Floats, bool]:

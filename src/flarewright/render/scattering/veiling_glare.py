@@ -30,8 +30,6 @@ LEAST_RAD, MOST_DEG = 1e-5, 88.0
 # rays from the centre of the sensor
 RAYS = 24
 
-__all__ = ["VeilingGlare", "veiling_glare"]
-
 
 @dataclass(frozen=True)
 class VeilingGlare:

@@ -34,6 +34,14 @@ if TYPE_CHECKING:
         Timeline,
     )
 
+
+class _AsInProject:
+    """Default of a setting in a signature."""
+
+    def __repr__(self) -> str:
+        return "<as in the project>"
+
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -98,10 +106,10 @@ def project_of(given: Project | Lens | str | PathLike[str], **settings: Unpack[S
         return Project.model_validate(fields)
     except ValidationError as error:
         from ...io.files.sentences import summary
-        from ...io.project.project_file import ProjectFileError, validation_messages
+        from ...io.project.project_file import validation_messages
 
         findings = validation_messages(error, fields)
-        raise ProjectFileError(summary("the project", findings), tuple(findings)) from None
+        raise ProjectError(summary("the project", findings), tuple(findings)) from None
 
 
 def naming_settings(function: Callable[P, R]) -> Callable[P, R]:
@@ -109,7 +117,7 @@ def naming_settings(function: Callable[P, R]) -> Callable[P, R]:
     plain = signature(function)
     named = [one for one in plain.parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
     named += [
-        Parameter(name, Parameter.KEYWORD_ONLY, default=..., annotation=annotation.__forward_arg__)
+        Parameter(name, Parameter.KEYWORD_ONLY, default=_AsInProject(), annotation=annotation.__forward_arg__)
         for name, annotation in Settings.__annotations__.items()
     ]
     # `inspect.signature` reads this attribute

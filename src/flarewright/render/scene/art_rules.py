@@ -332,6 +332,3 @@ def _chosen(facts: _Facts, select: str, where: str) -> list[str]:
 def _pairs(rows: Sequence[object]) -> int:
     surfaces = len(rows) - 1
     return surfaces * (surfaces - 1) // 2
-
-
-__all__ = ["PLAIN", "REACH", "Frame", "PathArt", "Ramp", "ResolvedArt", "has_overrides", "resolve_art", "with_gain"]

@@ -24,8 +24,6 @@ ASPECT_TOLERANCE = 0.01
 # a distance from which an object hides nothing, not even the sun, mm
 FARTHEST_MM = 1e9
 
-__all__ = ["Plate", "read_plates", "seen_part"]
-
 Plate = tuple[Holdout, Pixels]
 """A holdout with its opacity per pixel."""
 

@@ -110,8 +110,7 @@ def look_of(project: Project, name: str, notes: str = "") -> tuple[Look, tuple[s
 def without_lens_rules(art: Art) -> Art:
     """Return the art rules without those that name ghosts or rows of one lens."""
     rules = tuple(rule for rule in art.rules if not any(letter.isdigit() for letter in _named(rule.select)))
-    found: Art = art.replace(rules=rules)
-    return found
+    return art.replace(rules=rules)
 
 
 def _named(select: str) -> str:
@@ -124,8 +123,7 @@ def _with_look_light(light: Light, look: Look) -> Light:
     values = look.of("lights")
     if light.extended:
         values = {key: value for key, value in values.items() if key == "spectrum"}
-    changed: Light = light.replace(**values)
-    return changed
+    return light.replace(**values)
 
 
 def _transferred_coating(example: Project, project: Project) -> CoatingChoice:
@@ -157,8 +155,7 @@ def demonstration(look: Look, size_px: tuple[int, int] | None = None) -> Project
     project, _ = as_photographed(with_look(example, look)[0], look_keys(look))
     if size_px is None:
         return project
-    found: Project = project.replace(camera=project.camera.replace(size_px=size_px))
-    return found
+    return project.replace(camera=project.camera.replace(size_px=size_px))
 
 
 def look_keys(look: Look) -> frozenset[str]:

@@ -10,8 +10,6 @@ from ...typing import Floats
 from .art_rules import Frame
 from .shot import Shot
 
-__all__ = ["draft_centre", "ghost_frame"]
-
 
 def draft_centre(shot: Shot, path: LightPath) -> Floats:
     """Return the centre of a ghost from matrices, upright, mm, shape (2,)."""

@@ -28,16 +28,6 @@ TRIANGLES = 4096
 # a mask of the traced rays that pass
 RayFilter = Callable[[Floats], Mask]
 
-__all__ = [
-    "RayFilter",
-    "direct_flux",
-    "direct_spectrum",
-    "pixel_frame",
-    "spread_rays",
-    "traced_spectrum",
-    "visible_rays",
-]
-
 
 def traced_spectrum(shot: Shot, path: LightPath, bundle: Bundle, to_pixels: Floats) -> PathSpectrum | None:
     """Compute what coatings pass along a ghost's rays, as a spectrum.
@@ -157,7 +147,7 @@ def spread_rays(
     # both halves of a triangle in a row, so that rays are as many places of the pupil as without halves
     triangles = np.stack([few + half * nodes for half in range(halves)], axis=1).reshape(-1, 3)
     chosen: NDArray[np.intp] = choose_representatives(
-        np.concatenate([bundle.pupil] * halves), triangles, passing.ravel(), 1, count
+        np.concatenate([bundle.pupil] * halves), triangles, passing.ravel(), count
     )
     return chosen % nodes, chosen // nodes
 

@@ -28,11 +28,6 @@ leaves its spike the sooner the farther out (`optics.diffraction`), so that spik
 
 LIGHT_DEG = 0.25
 
-__all__ = [
-    "LIGHT_DEG", "ROUGHNESS_LENGTH_UM", "ROUGHNESS_UM", "ROUNDING", "as_photographed", "plausible_preset",
-    "stopped_down",
-]  # fmt: skip
-
 
 def as_photographed(project: Project, said: AbstractSet[str] = frozenset()) -> tuple[Project, tuple[str, ...]]:
     """Fill in settings for a lens of the library that the user has not given.

@@ -17,8 +17,6 @@ from .resolve import ResolvedProject
 from .shot import Shot, moved
 from .shots import make_shots
 
-__all__ = ["DirectImages", "angle_of", "direct_images", "field_angles_at", "field_deg_of", "image_px", "last_lit"]
-
 # pixels that a place found may miss the wanted one; drawing needs 0.1
 TOLERANCE_PX = 0.02
 # traced places until the search ends; distorted lenses need four to six, one near its limit of field some twenty

@@ -17,8 +17,6 @@ UNIFORM_RATIO = 1.5
 # largest number of lights listed separately
 MOST_LISTED = 3
 
-__all__ = ["outside_remarks", "veil_remarks"]
-
 
 def outside_remarks(shots: Sequence[Shot], images: Sequence[DirectImage]) -> list[str]:
     """Return remarks on lights that are imaged outside the picture.
@@ -63,12 +61,7 @@ def _outside_text(parts: Sequence[tuple[Shot, DirectImage]]) -> str:
         if shot.border is not None:
             reach = points(shot.border) * shot.packed.first_order.efl * per_mm
         (left, up), (right, down) = reach.min(axis=0), reach.max(axis=0)
-        far_out = {
-            "left of": -x - right,
-            "right of": x + left - width,
-            "above": -y - down,
-            "below": y + up - height,
-        }
+        far_out = {"left of": -x - right, "right of": x + left - width, "above": -y - down, "below": y + up - height}
         beyond = [(side, float(far)) for side, far in far_out.items() if far > 0.0]
         far = max((far for _, far in beyond), default=0.0)
         words = " and ".join(f"{max(round(far), 1)} px {side}" for side, far in beyond)

@@ -230,8 +230,7 @@ def _complete_everywhere(lens: Lens) -> Lens:
                 assert mine.semi_diameter is not None
                 if row.semi_diameter > mine.semi_diameter:
                     rows[k] = mine.replace(semi_diameter=row.semi_diameter)
-    found: Lens = full.replace(rows=tuple(rows)) if lens.positions else full
-    return found
+    return full.replace(rows=tuple(rows)) if lens.positions else full
 
 
 def _with_heights(lens: Lens) -> Lens:
@@ -243,8 +242,7 @@ def _with_heights(lens: Lens) -> Lens:
             rows.append(row.replace(figure=figure.replace(heights=read_heights(figure.image))))
         else:
             rows.append(row)
-    found: Lens = lens if all(a is b for a, b in zip(rows, lens.rows, strict=True)) else lens.replace(rows=tuple(rows))
-    return found
+    return lens if all(a is b for a, b in zip(rows, lens.rows, strict=True)) else lens.replace(rows=tuple(rows))
 
 
 def first_order(

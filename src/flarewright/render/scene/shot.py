@@ -135,8 +135,7 @@ def carried_at(shot: Shot, spectrum: PathSpectrum, wavelengths_nm: Floats) -> Fl
     traced_nm = shot.packed.wavelengths_nm
     if len(wavelengths_nm) == len(traced_nm):
         return spectrum.carried
-    carried: Floats = spectrum.carried @ hats(wavelengths_nm, traced_nm)
-    return carried
+    return spectrum.carried @ hats(wavelengths_nm, traced_nm)
 
 
 def seen_light(shot: Shot) -> Floats:

@@ -30,7 +30,6 @@ COARSE = 4
 SPIKE_PX, DISC_PX = (4.0, 24.0), 24.0
 # relative error up to which a spike's profile is replaced by its asymptotic tail
 TAIL_TOLERANCE = 0.01
-__all__ = ["Stars", "draw_stars"]
 
 
 @dataclass(frozen=True)

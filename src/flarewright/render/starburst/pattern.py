@@ -16,12 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flarewright.errors import ProjectError
-from flarewright.kernels.diffraction.resample import (
-    SpikeTables,
-    blend_blade_wings,
-    blend_fan_wings,
-    deposit_core,
-)
+from flarewright.kernels.diffraction.resample import SpikeTables, blend_blade_wings, blend_fan_wings, deposit_core
 from flarewright.model.lens.iris import Iris
 from flarewright.optics.diffraction.fraunhofer import BladeWings, FanWings, Pattern, pupil_pattern, spike_profile
 from flarewright.optics.pupil.dirt import VeilTerm
@@ -44,8 +39,6 @@ KNOTS = 1200
 
 MOST_PARTS = 100_000_000
 """Largest number of parts of the pixels near the centre, limited by memory."""
-
-__all__ = ["Painter", "painter_of", "starburst_layer"]
 
 
 def starburst_layer(
@@ -280,13 +273,7 @@ class Painter:
         share = np.interp(turns, np.arange(count), term.angular, period=count) if count > 1 else term.angular[0]
         out += (window * share)[..., None] * self._radial(r, value, self.inner)
 
-    def _core(
-        self,
-        x_edges: Floats,
-        y_edges: Floats,
-        pixel_mm: tuple[float, float],
-        out: Pixels | Floats,
-    ) -> None:
+    def _core(self, x_edges: Floats, y_edges: Floats, pixel_mm: tuple[float, float], out: Pixels | Floats) -> None:
         """Add the flux of the Fourier pattern inside the square around the outer radius."""
         columns = np.flatnonzero((x_edges[1:] > -self.outer) & (x_edges[:-1] < self.outer))
         rows = np.flatnonzero((y_edges[:-1] > -self.outer) & (y_edges[1:] < self.outer))
@@ -300,10 +287,7 @@ class Painter:
 
 
 def _in_bands(
-    blend: Callable[[Floats, Pixels | Floats], None],
-    y: Floats,
-    out: Pixels | Floats,
-    threads: int | None,
+    blend: Callable[[Floats, Pixels | Floats], None], y: Floats, out: Pixels | Floats, threads: int | None
 ) -> None:
     """Blend rows of pixels, which are independent, in bands on several threads."""
     if threads == 1 or len(y) <= BAND:

@@ -11,8 +11,6 @@ SPECTRUM_TOLERANCE = 0.02
 # weight of a spectrum's total, relative to its single wavelengths, in the fit
 SUM_WEIGHT = 1e3
 
-__all__ = ["basis_spectra"]
-
 
 def basis_spectra(colors: Floats, most: int) -> tuple[list[int], Floats, Mask]:
     """Choose lights whose spectra represent those of all lights.

@@ -10,10 +10,10 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ProjectError
+from ...colorimetry import VISIBLE_NM
+from ...errors import ProjectError, raised_as
 from ...io.images.mask_image import read_mask
 from ...model import Dirt, Iris, Layer, Lines, Starburst
-from ...optics.colour.spectrum import VISIBLE_NM
 from ...optics.diffraction.fraunhofer import BladeWings, Pattern, Soil, pupil_pattern
 from ...optics.lens.paths import direct_path
 from ...optics.pupil.polygon import mapped, points
@@ -40,8 +40,6 @@ OUT_OF_FOCUS_PX = 1.0
 MANY_LIGHTS = 8
 # least number of lights per basis spectrum for which drawing them together saves time
 LIGHTS_PER_SPECTRUM = 6
-
-__all__ = ["read_soil", "starburst_of"]
 
 
 @dataclass(frozen=True)
@@ -297,13 +295,11 @@ def _patterns(scene: _Scene, shot: Shot, turns: Floats) -> list[Pattern | None]:
             return [None] * len(turns)
         # the traced pupil already contains the blades
         iris, span = Iris(), PUPIL_SPAN
-    try:
+    with raised_as(ProjectError):
         return [
             pupil_pattern(iris, mask, span=span, radius_mm=order.stop_semi_diameter, soil=scene.soil, turn=float(turn))
             for turn in turns
         ]
-    except ValueError as error:
-        raise ProjectError(str(error)) from error
 
 
 def _diffracted_wavelengths(shot: Shot) -> Floats:

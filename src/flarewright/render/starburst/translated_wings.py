@@ -26,8 +26,6 @@ PARTS, DRAFT_PARTS = 2, 1
 # largest size of the atlas in memory; a larger one is drawn in pieces
 ATLAS_BYTES = 100_000_000
 
-__all__ = ["BAND", "add_moved_wings", "in_threads"]
-
 
 def in_threads(work: Callable[[int], None], items: Iterable[int], threads: int | None) -> None:
     """Apply a function to every item in several threads."""

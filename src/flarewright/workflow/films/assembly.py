@@ -37,8 +37,6 @@ from .look import FilmLook, film_look, shown
 if TYPE_CHECKING:
     from .look import FilmView
 
-__all__ = ["FilmResult", "assemble_film", "check_film"]
-
 _FPS = 24.0
 # frames that are encoded again after an interruption, at most
 _PART_FRAMES = 120

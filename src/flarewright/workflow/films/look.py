@@ -18,8 +18,6 @@ from ...io.images.transfer import encoded_rec709
 from ...plates.measured_plate import converted
 from ...render.image.display import Transform, auto_exposure, layers_exposure, view, view_text
 
-__all__ = ["FilmLook", "FilmView", "check_look", "film_look", "shown"]
-
 FilmView = Literal["filmic", "srgb", "aces", "rec709"]
 """The transforms of PNG files, and rec709: the curve of video cameras, as most films have it."""
 

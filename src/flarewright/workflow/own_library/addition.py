@@ -222,8 +222,7 @@ def _with_own_pictures(lens: Lens) -> Lens:
             rows.append(row.replace(figure=figure.replace(image=_own_picture(figure.image))))
         else:
             rows.append(row)
-    found: Lens = lens.replace(rows=tuple(rows))
-    return found
+    return lens.replace(rows=tuple(rows))
 
 
 def _own_picture(path: str) -> str:
@@ -304,6 +303,3 @@ class _Names:
         self._keys.add(key_of(record.name))
         if record.digest:
             self._by_digest[record.digest] = record.name
-
-
-__all__ = ["Addition", "Refused", "add_lenses"]

@@ -50,6 +50,3 @@ def _short(text: str) -> str:
 def shipped_records() -> tuple[LensRecord, ...]:
     """Return what is known of the shipped lenses."""
     return tuple(record_of(open_lens(name), name) for name in library_names())
-
-
-__all__ = ["record_of", "shipped_records"]

@@ -218,13 +218,3 @@ def _pictures_in(path: Path) -> set[str]:
         return set()
     # any text of a lens can hold such a path: only names that the library gives are files of it
     return set(_PICTURE.findall(text))
-
-
-__all__ = [
-    "Library",
-    "find_own",
-    "kept_record",
-    "library_lock",
-    "own_library",
-    "remove_lens",
-]

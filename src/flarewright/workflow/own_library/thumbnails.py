@@ -71,7 +71,7 @@ def make_thumbnails(
         if progress is not None:
             progress(k / len(names), name)
         try:
-            make_thumbnail(name)
+            _make_thumbnail(name)
             made += 1
         except OutputError:
             raise
@@ -92,25 +92,8 @@ def read_thumbnail(name: str) -> bytes | None:
         return None
 
 
-def make_thumbnail(name: str) -> Path:
-    """Render the thumbnail of one of the user's lenses.
-
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    Path
-        JPEG, `SIZE_PX`: the lens as its file states it, wide open, with a light up and left of the centre.
-
-    Raises
-    ------
-    FlarewrightError
-        The lens cannot be drawn.
-    OutputError
-        The picture cannot be written.
-    """
+def _make_thumbnail(name: str) -> Path:
+    """Write the thumbnail of a lens: as its file states it, wide open, with a light up and left of the centre."""
     path = lens_path(name)
     with sentences_for(path, "a lens"):
         project = card_project(lens_card(name), SIZE_PX)
@@ -124,6 +107,3 @@ def _write(name: str, pixels: NDArray[np.uint8]) -> Path:
     writable_folder()
     write_atomically(target, partial(Image.fromarray(pixels).save, format="JPEG", quality=_QUALITY))
     return target
-
-
-__all__ = ["make_thumbnail", "make_thumbnails", "missing_thumbnails", "read_thumbnail"]

@@ -27,19 +27,6 @@ from .plate_files import plate_picture
 from .plate_frame import bare_text, check_plate, images_of, plate_images, plate_optics, same_optics
 from .plate_sources import PlateShot, plate_shot
 
-__all__ = [
-    "FoundLights",
-    "backplate_picture",
-    "backplate_shot",
-    "kept_on_plate",
-    "plate_settings_of",
-    "search_plate",
-    "search_values",
-    "traced_places",
-    "with_found_lights",
-    "without_found_lights",
-]
-
 # frame of a single plate
 _FRAME = 1
 # largest disc and rectangle after a change of the lens, degrees
@@ -185,8 +172,7 @@ def _framed(project: Project, size_px: tuple[int, int]) -> Project:
         across, down = camera.sensor_mm
         high = down * (size_px[1] / size_px[0]) / (camera.size_px[1] / camera.size_px[0])
         camera = camera.replace(sensor_mm=(across, high))
-    changed: Project = project.replace(camera=camera.replace(size_px=size_px))
-    return changed
+    return project.replace(camera=camera.replace(size_px=size_px))
 
 
 def without_found_lights(project: Project) -> Project:
@@ -197,8 +183,7 @@ def without_found_lights(project: Project) -> Project:
     if not project.lit_by_plate:
         return project
     own = tuple(light for light in project.lights if not found_in_plate(light))
-    changed: Project = project.replace(lights=own or (Light(field_deg=(0.0, 0.0), intensity=0.0),))
-    return changed
+    return project.replace(lights=own or (Light(field_deg=(0.0, 0.0), intensity=0.0),))
 
 
 def backplate_shot(project: Project) -> PlateShot:
@@ -280,8 +265,7 @@ def kept_on_plate(before: Project, after: Project) -> Project:
         # a lens that makes no image, until it is repaired
         return after
     lights = tuple(moved.light(old, new) for old, new in zip(before.lights, after.lights, strict=True))
-    found: Project = after.replace(lights=lights)
-    return found
+    return after.replace(lights=lights)
 
 
 class _Moved:
@@ -304,8 +288,7 @@ class _Moved:
             "keyframes": tuple(LightKey(at_s=k.at_s, field_deg=self.angles(k.field_deg)[0]) for k in old.keyframes),
             "curves": tuple(_brighter(curve, ratio[1]) for curve in old.curves),
         }
-        found: Light = new.replace(**changes)
-        return found
+        return new.replace(**changes)
 
     def angles(self, field_deg: tuple[float, float]) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return new field angles, and the ratios of the solid angle and of the irradiance."""
@@ -335,8 +318,7 @@ def _brighter(curve: LightCurve, ratio: float) -> LightCurve:
     if curve.of != "intensity":
         return curve
     values = np.array(curve.values, dtype=np.float64) * ratio
-    found: LightCurve = curve.replace(values=tuple(values.tolist()))
-    return found
+    return curve.replace(values=tuple(values.tolist()))
 
 
 def _scaled(shape: Rectangle | Polygon | None, scale: float) -> Rectangle | Polygon | None:

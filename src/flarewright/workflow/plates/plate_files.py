@@ -19,10 +19,6 @@ from ...jobs.frame_list import FramePattern, frames_text
 from ...plates.settings import PlateSettings
 from ...typing import Pixels
 
-__all__ = [
-    "first_picture", "is_still", "plate_digest", "plate_frames", "plate_matte", "plate_name", "plate_picture",
-]  # fmt: skip
-
 
 def is_still(settings: PlateSettings) -> bool:
     """Return whether all frames have the same picture and matte."""

@@ -21,21 +21,6 @@ from ...render.scene.resolve import resolve_project
 from .plate_files import plate_matte, plate_picture
 from .plate_sources import PlateShot
 
-__all__ = [
-    "alike_lights",
-    "bare_text",
-    "check_comp",
-    "check_plate",
-    "comp_attributes",
-    "images_of",
-    "plate_images",
-    "plate_optics",
-    "same_optics",
-    "with_plate_lights",
-    "with_radiances",
-    "write_comp",
-]
-
 # passes that a comp adds; the beauty is their sum
 _BEAUTY = "beauty"
 # relative difference of the shapes of plate and picture
@@ -99,8 +84,7 @@ def with_radiances(project: Project) -> Project:
         )
     factor = plate_optics(project)[1]
     lights = tuple(light.replace(intensity=light.intensity * factor) for light in project.lights)
-    found: Project = project.replace(lights=lights)
-    return found
+    return project.replace(lights=lights)
 
 
 def plate_optics(project: Project) -> tuple[FieldMap, float]:

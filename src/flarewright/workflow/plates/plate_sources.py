@@ -32,8 +32,6 @@ from ...plates.tracking import TrackingSettings, follow, steady
 from ...typing import Floats
 from .plate_files import is_still, plate_digest, plate_matte, plate_name, plate_picture
 
-__all__ = ["PlateShot", "plate_shot", "sources_file", "sources_of_frame"]
-
 # frames whose mean sets a threshold in stops
 _MEAN_FRAMES = 24
 # part of the clipping value that a threshold in stops stays below

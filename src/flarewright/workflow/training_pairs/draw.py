@@ -177,8 +177,7 @@ def brightened(project: Project, mean_luminance: float) -> Project:
     """Return a project with the intensities of its lights scaled to pi times a background's mean luminance."""
     scale = pi * mean_luminance
     lights = tuple(light.replace(intensity=light.intensity * scale) for light in project.lights)
-    found: Project = project.replace(lights=lights)
-    return found
+    return project.replace(lights=lights)
 
 
 def _quality(spec: DatasetSpec) -> Quality:
@@ -212,12 +211,11 @@ def _iris(spec: DatasetSpec, index: int, name: str) -> Iris:
     rng = stream(spec, index // draws.repeat, IRIS)
     blades = None if draws.blades is None else int(draw_number(draws.blades, rng))
     own = open_lens(name).lens.iris
-    found: Iris = own.replace(
+    return own.replace(
         **({} if blades is None else {"blades": blades, "mask": None}),
         **({} if draws.rounding is None else {"rounding": draw_number(draws.rounding, rng)}),
         rotation_deg=draw_number(draws.rotation_deg, rng),
     )
-    return found
 
 
 def _dirt(spec: DatasetSpec, index: int) -> Dirt:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import FileError, FlarewrightError, OutputError
-from ...io.files.atomic_write import write_bytes_atomically
+from ...io.files.atomic_write import make_folder, write_bytes_atomically
 from ...io.files.tar_members import members, tar_member
 from ...io.files.text_file import read_bytes
 from ...jobs.worker import WRITING
@@ -163,10 +163,6 @@ def _has_size(folder: Path, about: dict[str, Any]) -> bool:
 
 def _write(path: Path, data: bytes) -> None:
     """Write a file, atomically; see `jobs.worker.WRITING`."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot make the folder {path.parent} ({(error.strerror or str(error)).lower()})") from None
-
+    make_folder(path.parent)
     with WRITING:
         write_bytes_atomically(path, data)

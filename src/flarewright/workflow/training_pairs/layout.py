@@ -54,11 +54,7 @@ def item_files(spec: DatasetSpec, drawn: Pictures, digest: str) -> tuple[dict[st
     files = {name_of(spec, drawn.split, index, part): data for part, data in contents.items()}
     files[name_of(spec, drawn.split, index, "project")] = project
     listed = {
-        part: {
-            "file": name_of(spec, drawn.split, index, part),
-            "bytes": len(data),
-            "sha256": sha256(data).hexdigest(),
-        }
+        part: {"file": name_of(spec, drawn.split, index, part), "bytes": len(data), "sha256": sha256(data).hexdigest()}
         for part, data in {**contents, "project": project}.items()
     }
     record = {"key": key_of(index), "digest": digest, **drawn.record, "files": listed}

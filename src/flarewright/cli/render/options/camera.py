@@ -21,8 +21,7 @@ class CameraOptions:
         ),
     ] = None
     sensor_reflectance: Annotated[
-        float | None,
-        typer.Option(help="Reflectance of the sensor, 0 to 1 (default: 0).", rich_help_panel=PANEL),
+        float | None, typer.Option(help="Reflectance of the sensor, 0 to 1 (default: 0).", rich_help_panel=PANEL)
     ] = None
     sensor_grating: Annotated[
         str | None,

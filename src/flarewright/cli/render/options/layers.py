@@ -51,8 +51,7 @@ class LayerOptions:
         ),
     ] = None  # fmt: skip
     gamut: Annotated[
-        str | None,
-        typer.Option(help="keep negative channels (default), or compress colours.", rich_help_panel=PANEL),
+        str | None, typer.Option(help="keep negative channels (default), or compress colours.", rich_help_panel=PANEL)
     ] = None
     half: Annotated[bool, typer.Option("--half", help="Write 16 bits per value (default).", rich_help_panel=PANEL)] = (
         False

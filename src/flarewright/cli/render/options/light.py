@@ -63,10 +63,8 @@ class LightOptions:
         ),
     ] = field(default_factory=list)
     holdout: Annotated[
-        Path | None,
-        typer.Option(help="An image in the picture's frame; black hides lights.", rich_help_panel=PANEL),
+        Path | None, typer.Option(help="An image in the picture's frame; black hides lights.", rich_help_panel=PANEL)
     ] = None
     depth: Annotated[
-        Path | None,
-        typer.Option(help="An EXR depth plate in metres; nearer parts hide lights.", rich_help_panel=PANEL),
+        Path | None, typer.Option(help="An EXR depth plate in metres; nearer parts hide lights.", rich_help_panel=PANEL)
     ] = None

@@ -32,8 +32,7 @@ class OutputOptions(LayerOptions, FileOption):
         float | None, typer.Option(help="Exposure of the PNG in stops (default: automatic).", rich_help_panel=PANEL)
     ] = None
     ev: Annotated[
-        float | None,
-        typer.Option(help="Exposure of the PNG as exposure value, log2(N^2 / t).", rich_help_panel=PANEL),
+        float | None, typer.Option(help="Exposure of the PNG as exposure value, log2(N^2 / t).", rich_help_panel=PANEL)
     ] = None
     shutter: Annotated[
         str | None,
@@ -52,8 +51,7 @@ class OutputOptions(LayerOptions, FileOption):
         ),
     ] = None
     view: Annotated[
-        str | None,
-        typer.Option(help="View of the PNG: filmic (default), srgb or aces.", rich_help_panel=PANEL),
+        str | None, typer.Option(help="View of the PNG: filmic (default), srgb or aces.", rich_help_panel=PANEL)
     ] = None
     no_png: Annotated[bool, typer.Option("--no-png", help="Write no PNG beside the EXR.", rich_help_panel=PANEL)] = (
         False

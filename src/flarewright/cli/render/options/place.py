@@ -43,8 +43,7 @@ class PlaceOptions:
         typer.Option(help="With --sun: where the camera looks, degrees clockwise from north.", rich_help_panel=PANEL),
     ] = None
     tilt: Annotated[
-        float | None,
-        typer.Option(help="With --sun: degrees above the horizon (default: 0).", rich_help_panel=PANEL),
+        float | None, typer.Option(help="With --sun: degrees above the horizon (default: 0).", rich_help_panel=PANEL)
     ] = None
     roll: Annotated[
         float | None,

@@ -42,20 +42,17 @@ class PlateOptions:
         typer.Option(help="Plate value above which a pixel is a light (luminance).", rich_help_panel=PANEL),
     ] = None
     stops: Annotated[
-        float | None,
-        typer.Option(help="The same in stops above the plate's mean (default: 5).", rich_help_panel=PANEL),
+        float | None, typer.Option(help="The same in stops above the plate's mean (default: 5).", rich_help_panel=PANEL)
     ] = None
     flare_matte: Annotated[
         str | None,
         typer.Option(metavar="FILE", help="Picture or sequence; black areas do not flare.", rich_help_panel=PANEL),
     ] = None
     least_pixels: Annotated[
-        int | None,
-        typer.Option(help="Leave out sources of fewer pixels (default: 1).", rich_help_panel=PANEL),
+        int | None, typer.Option(help="Leave out sources of fewer pixels (default: 1).", rich_help_panel=PANEL)
     ] = None
     most_lights: Annotated[
-        int | None,
-        typer.Option(help="Lights a frame; fainter ones are joined (default: 32).", rich_help_panel=PANEL),
+        int | None, typer.Option(help="Lights a frame; fainter ones are joined (default: 32).", rich_help_panel=PANEL)
     ] = None
     point_size: Annotated[
         float | None,

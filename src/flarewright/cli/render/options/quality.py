@@ -49,7 +49,6 @@ class QualityOptions:
     order4_limit: Annotated[
         float | None,
         typer.Option(
-            help="Draw those above this fraction of the two-reflection light (default: 1e-4).",
-            rich_help_panel=PANEL,
+            help="Draw those above this fraction of the two-reflection light (default: 1e-4).", rich_help_panel=PANEL
         ),
     ] = None

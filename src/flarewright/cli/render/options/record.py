@@ -32,7 +32,7 @@ class RenderOptions(
 ):
     """The options as given; the last base comes first on the help page."""
 
-    resumed: Any = None
-    """The `Project` of a picture that resumes, or one that a look has made; help does not load its type."""
+    base: Any = None
+    """The `Project` of the file, of a picture that resumes or of a look; help does not load its type."""
     tracked: Any = ()
     """Tracks of `--track` (`cli.render.tracks.GivenTrack`)."""

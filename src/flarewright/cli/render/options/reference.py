@@ -16,8 +16,7 @@ class ReferenceOptions:
     """Reference quality: errors, samples, time. None or empty: not given."""
 
     seed: Annotated[
-        int | None,
-        typer.Option(help="Seed of all random numbers: rays, dirt, rough edges.", rich_help_panel=PANEL),
+        int | None, typer.Option(help="Seed of all random numbers: rays, dirt, rough edges.", rich_help_panel=PANEL)
     ] = None
     error: Annotated[
         float | None,
@@ -28,8 +27,7 @@ class ReferenceOptions:
         typer.Option(help="Error of blocks (16x16 pixels) or of the total of all ghosts.", rich_help_panel=PANEL),
     ] = None
     rays_from: Annotated[
-        str | None,
-        typer.Option(help="Sampling of area lights: auto, light or camera.", rich_help_panel=PANEL),
+        str | None, typer.Option(help="Sampling of area lights: auto, light or camera.", rich_help_panel=PANEL)
     ] = None
     samples: Annotated[
         int | None, typer.Option(help="Largest number of traced points on the front.", rich_help_panel=PANEL)
@@ -38,6 +36,5 @@ class ReferenceOptions:
         float | None, typer.Option(metavar="SECONDS", help="Stop after this time.", rich_help_panel=PANEL)
     ] = None
     resume: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Resume from a .state.npz file.", rich_help_panel=PANEL),
+        Path | None, typer.Option(metavar="FILE", help="Resume from a .state.npz file.", rich_help_panel=PANEL)
     ] = None

@@ -124,8 +124,7 @@ class ShotOutput(MovieOptions, LayerOptions, ShotFiles):
         ),
     ] = False
     processes: Annotated[
-        int | None,
-        typer.Option(min=1, help="Number of processes (default: one per core).", rich_help_panel=WORK),
+        int | None, typer.Option(min=1, help="Number of processes (default: one per core).", rich_help_panel=WORK)
     ] = None
     chunk: Annotated[
         str | None,
@@ -160,5 +159,5 @@ class ShotOptions(
 ):
     """The options as given; the last base comes first on the help page."""
 
-    resumed: Any = None
-    """A `Project` that a look has made."""
+    base: Any = None
+    """The `Project` of the file."""

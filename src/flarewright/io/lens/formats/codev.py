@@ -16,16 +16,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from pydantic import ValidationError
-
-from flarewright.model import Medium, Surface
+from flarewright.model import Medium
 from flarewright.model.lens.raw_lens import Configuration, RawSequence, SequenceRow
 
 from ...files.door import shown
-from ...files.sentences import shorten, validation_sentences
+from ...files.sentences import shorten
 from .. import media
 from ..configuration_table import Stated
-from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_data, number_of, whole
+from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_data, number_of, sequence_row, whole
 from ..lens_fields import CURVATURE
 from ..medium_names import named_medium, tabulated_medium
 from .codev_words import FIELDS, IDLE, IN_ITS_LINE, SHIFTS, UNSUPPORTED, VIGNETTING
@@ -260,24 +258,16 @@ def _row(surface: _Surface, mm: float, radii: bool, reading: _Reading) -> Sequen
     rest = surface.words[2:]
     if any(word.upper() in ("REFL", "REFR:REFL", "TIR") for word in rest):
         problems.append(f"{where} is a mirror: reflecting surfaces are not supported")
-    elif rest and (medium := _medium(rest[0], surface.number, reading)) is not None and thickness < 0.0:
-        problems.append(f"{where}: glass cannot be {thickness * mm:g} mm thick")
+    elif rest:
+        medium = _medium(rest[0], surface.number, reading)
     curvature = first / mm if not radii else 1.0 / (first * mm) if first else 0.0
-    if refusal := CURVATURE.refuse(curvature):
-        problems.append(f"{where}: the curvature {refusal}")
+    CURVATURE.read(curvature, f"{where}: the curvature", problems)
     most = max((k for k, value in surface.terms.items() if value), default=-1)
-    if len(problems) > before:
-        return None
-    try:
-        made = Surface(
-            curvature=curvature, conic=surface.conic, thickness=thickness * mm, medium=medium,
-            asphere=tuple(surface.terms.get(k, 0.0) / mm ** (2 * k + 3) for k in range(most + 1)),
-            semi_diameter=None if surface.rim is None else surface.rim * mm,
-        )  # fmt: skip
-    except ValidationError as error:
-        problems += [f"{where}: {sentence}" for sentence in validation_sentences(error)]
-        return None
-    return SequenceRow(number=surface.number, surface=made, stop=surface.stop)
+    return sequence_row(
+        where, problems, before, number=surface.number, stop=surface.stop, curvature=curvature, conic=surface.conic,
+        thickness=thickness * mm, medium=medium, semi_diameter=None if surface.rim is None else surface.rim * mm,
+        asphere=tuple(surface.terms.get(k, 0.0) / mm ** (2 * k + 3) for k in range(most + 1)),
+    )  # fmt: skip
 
 
 def _kind(radii: bool) -> str:
@@ -345,6 +335,3 @@ def _remark(reading: _Reading) -> None:
     for key, at in reading.unknown.items():
         where = f"surface{'s'[: len(at) > 1]} {', '.join(at)}: " if at else ""
         reading.remarks.append(f"{where}command {shorten(key)} is left out")
-
-
-__all__ = ["FirstColumn", "read_seq"]

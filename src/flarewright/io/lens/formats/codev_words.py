@@ -27,5 +27,3 @@ IN_ITS_LINE = frozenset({"RDY", "CUY", "THI", "GLA", "RMD"})
 
 SHIFTS = frozenset({"ADE", "BDE", "CDE", "XDE", "YDE", "ZDE", "ALP", "BET", "GAM", "CUX", "RDX"})
 """Those of `UNSUPPORTED` that 0 makes idle."""
-
-__all__ = ["FIELDS", "IDLE", "IN_ITS_LINE", "SHIFTS", "UNSUPPORTED", "VIGNETTING"]

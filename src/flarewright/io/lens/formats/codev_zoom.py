@@ -165,6 +165,3 @@ def positions(zoom: Zoom, stated: Stated, fields: tuple[str, str], remarks: list
         else:
             whole.append(number)
     return settings(zoom.table, whole, commands, stated, remarks)
-
-
-__all__ = ["Zoom", "positions", "solved_gap", "zoom_cell", "zoom_row"]

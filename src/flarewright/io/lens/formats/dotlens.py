@@ -23,7 +23,7 @@ from ..foreign_file import MOST_SURFACES, lens_errors
 from ..lens_fields import ROW_NUMBERS
 
 _COLUMNS = ("radius", "thickness", "index", "Abbe number", "aperture", "coating layers")
-_COUNTS = re.compile(r"(\d+)\s+surfaces?(?:,\s*(\d+)\s+glass elements?)?")
+_COUNTED = re.compile(r"(\d+)\s+surfaces?")
 _F_NUMBER = re.compile(r"\bf/\s*(\d+(?:\.\d+)?)")
 _WIDEST = 2000.0
 _TIGHTEST = 1e-3
@@ -82,7 +82,7 @@ class _Reading:
     patent: str = ""
     f_number: float | None = None
     focal_length: float | None = None
-    counts: tuple[int | None, int | None] = (None, None)
+    surfaces: int | None = None
     rows: list[RawRow] = field(default_factory=list)
     findings: list[tuple[int, media.Finding]] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
@@ -97,8 +97,8 @@ def _read_comment(comment: str, reading: _Reading, in_table: bool) -> None:
         reading.title = comment
     elif comment.lower().startswith("patent:"):
         reading.patent = comment.partition(":")[2].strip()
-    elif counts := _COUNTS.search(comment):
-        reading.counts = (int(counts[1]), int(counts[2]) if counts[2] else None)
+    elif counted := _COUNTED.search(comment):
+        reading.surfaces = int(counted[1])
         if (stated := _F_NUMBER.search(comment)) and 0.3 < float(stated[1]) <= 256.0:
             reading.f_number = float(stated[1])
 
@@ -183,8 +183,7 @@ def _finish(path: Path, reading: _Reading) -> RawLens:
         patent=reading.patent,
         f_number=reading.f_number,
         focal_length=reading.focal_length,
-        stated_surfaces=reading.counts[0],
-        stated_elements=reading.counts[1],
+        stated_surfaces=reading.surfaces,
         rows=tuple(reading.rows),
         remarks=(*reading.remarks, *media.remarks(reading.findings, "line")),
     )

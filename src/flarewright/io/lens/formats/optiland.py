@@ -15,18 +15,16 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from flarewright.errors import LensError
 from flarewright.model import Lens, Medium, Stop, Surface
 from flarewright.model.lens.prescription import MOST_TERMS
 from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
 
 from ...files.door import sentences_for, shown
-from ...files.sentences import shorten, validation_sentences
+from ...files.sentences import shorten
 from ...files.text_file import read_json
 from .. import media
-from ..foreign_file import INFINITE, MOST_SURFACES, json_number, largest_field, lens_errors, whole
+from ..foreign_file import INFINITE, MOST_SURFACES, json_number, largest_field, lens_errors, sequence_row, whole
 from ..lens_fields import CURVATURE
 from ..medium_names import numbered_medium
 
@@ -119,22 +117,16 @@ def _row(
         problems.append(f"{where} is tilted or shifted, which is not supported")
     values = _shape(where, str(kind), geometry, problems)
     medium = _medium(k, _part(entry, "material_post"), problems, findings)
-    if medium is not None and gap < 0.0:
-        problems.append(f"{where}: glass cannot be {gap:g} mm thick")
     aperture = entry.get("aperture")
     rim = None
     if isinstance(aperture, dict):
         rim = json_number(aperture.get("r_max")) if aperture.get("type") == "RadialAperture" else None
         if rim is None or aperture.get("r_min"):
             remarks.append(f"{where}: an aperture that is not round or annular is simplified")
-    if len(problems) > before:
-        return None
-    try:
-        surface = Surface(**values, thickness=gap, medium=medium, semi_diameter=rim or None)
-    except ValidationError as error:
-        problems += [f"{where}: {sentence}" for sentence in validation_sentences(error)]
-        return None
-    return SequenceRow(number=k, surface=surface, stop=bool(entry.get("is_stop")))
+    stop = bool(entry.get("is_stop"))
+    return sequence_row(
+        where, problems, before, number=k, stop=stop, **values, thickness=gap, medium=medium, semi_diameter=rim or None
+    )
 
 
 def _gap(entry: Mapping[str, Any], distance: float) -> float:
@@ -152,8 +144,7 @@ def _shape(where: str, kind: str, geometry: Mapping[str, Any], problems: list[st
             problems.append(f"{where}: {key} is {shorten(value)}, a length was expected")
             return 0.0
         found = 1.0 / value
-        if refusal := CURVATURE.refuse(found):
-            problems.append(f"{where}: the curvature {refusal}")
+        CURVATURE.read(found, f"{where}: the curvature", problems)
         return found
 
     def conic(key: str) -> float:
@@ -335,6 +326,3 @@ def _entry(geometry: dict[str, Any], gap: float, stop: bool) -> dict[str, Any]:
     interaction = {"type": "RefractiveReflectiveModel", "is_reflective": False, "coating": None, "bsdf": None}
     entry = {"type": "Surface", "thickness": gap, "geometry": geometry, "is_stop": stop}
     return entry | {"comment": "", "interaction_model": interaction}
-
-
-__all__ = ["optiland_text", "read_optiland"]

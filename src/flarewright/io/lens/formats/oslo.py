@@ -17,17 +17,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pydantic import ValidationError
-
-from flarewright.model import Medium, Surface
+from flarewright.model import Medium
 from flarewright.model.lens.prescription import MOST_TERMS
 from flarewright.model.lens.raw_lens import Configuration, RawSequence, SequenceRow
 
 from ...files.door import shown
-from ...files.sentences import shorten, validation_sentences
+from ...files.sentences import shorten
 from .. import media
 from ..configuration_table import Stated
-from ..foreign_file import INFINITE, MOST_SURFACES, decoded, lens_data, number_of, whole
+from ..foreign_file import INFINITE, MOST_SURFACES, decoded, lens_data, number_of, sequence_row, whole
 from ..lens_fields import CURVATURE
 from ..medium_names import named_medium, numbered_medium, tabulated_medium
 from .oslo_configurations import Table, cell, configurations
@@ -83,7 +81,6 @@ class _Reading:
 
     name: str = ""
     count: int | None = None
-    unit_mm: float = 1.0
     head: dict[str, float] = field(default_factory=dict)
     surfaces: dict[int, _Surface] = field(default_factory=lambda: {0: _Surface(0)})
     at: int = 0
@@ -330,26 +327,16 @@ def _row(surface: _Surface, mm: float, reading: _Reading) -> SequenceRow | None:
         curvature, conic = 2.0 * square, -1.0
     elif square:
         problems.append(f"{where} has a term of r^2 beside its curvature, which is not supported")
-    if refusal := CURVATURE.refuse(curvature):
-        problems.append(f"{where}: the curvature {refusal}")
+    CURVATURE.read(curvature, f"{where}: the curvature", problems)
     medium = _medium(surface, reading)
-    if medium is not None and surface.thickness < 0.0:
-        problems.append(f"{where}: glass cannot be {surface.thickness * mm:g} mm thick")
     if surface.rim is not None and surface.rim < 0.0:
         problems.append(f"{where}: AP is {surface.rim:g}, a length was expected")
-    if len(problems) > before:
-        return None
     most = max((n for n, value in terms.items() if value), default=1)
-    try:
-        made = Surface(
-            curvature=curvature, conic=conic, thickness=surface.thickness * mm, medium=medium,
-            asphere=tuple(terms.get(n, 0.0) for n in range(2, most + 1)),
-            semi_diameter=surface.rim * mm if surface.rim else None,
-        )  # fmt: skip
-    except ValidationError as error:
-        problems += [f"{where}: {sentence}" for sentence in validation_sentences(error)]
-        return None
-    return SequenceRow(number=surface.number, surface=made, stop=surface.stop)
+    return sequence_row(
+        where, problems, before, number=surface.number, stop=surface.stop, curvature=curvature, conic=conic,
+        thickness=surface.thickness * mm, medium=medium, semi_diameter=surface.rim * mm if surface.rim else None,
+        asphere=tuple(terms.get(n, 0.0) for n in range(2, most + 1)),
+    )  # fmt: skip
 
 
 def _even_terms(surface: _Surface, mm: float, problems: list[str]) -> dict[int, float]:
@@ -422,6 +409,3 @@ def _remark(reading: _Reading) -> None:
     for key, at in reading.unknown.items():
         where = f"surface{'s'[: len(at) > 1]} {', '.join(at[:20])}"
         reading.remarks.append(f"{where}: command {shorten(key)} is left out")
-
-
-__all__ = ["read_len"]

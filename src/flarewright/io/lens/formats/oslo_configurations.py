@@ -109,6 +109,3 @@ def configurations(
 def _signed(word: str, factor: float) -> str:
     value = number_of(word)
     return word if value is None else repr(factor * value)
-
-
-__all__ = ["Table", "cell", "configurations"]

@@ -98,6 +98,3 @@ def _stated(data: dict[str, Any], key: str, head: TableHead) -> float | None:
         head.problems.append(f"{key} is {shorten(data[key])}, a number was expected")
         return None
     return value or None
-
-
-__all__ = ["read_realflare"]

@@ -7,17 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from pydantic import ValidationError
-
 from flarewright.errors import LensError
-from flarewright.model import Surface
 from flarewright.model.lens.prescription import LARGEST_F_NUMBER, LEAST_F_NUMBER
 from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
 
 from ...files.door import shown
-from ...files.sentences import summary, validation_sentences
+from ...files.sentences import summary
 from .. import media
-from ..foreign_file import MOST_SURFACES
+from ..foreign_file import MOST_SURFACES, sequence_row
 from ..medium_names import numbered_medium
 
 _TIGHTEST = 1e-3
@@ -133,17 +130,9 @@ def _row(row: TableRow, head: TableHead, findings: list[tuple[int, media.Finding
         medium = numbered_medium(row.glass, row.n_d, row.v_d, where, problems, findings, row.number)
     elif row.v_d:
         problems.append(f"{where}: an Abbe number alone is no glass: add n_d or the glass's name")
-    if medium is not None and row.thickness < 0.0:
-        problems.append(f"{where}: glass cannot be {row.thickness:g} mm thick")
-    if len(problems) > before:
-        return None
     flat = row.radius == 0.0 or math.isinf(row.radius)
-    try:
-        surface = Surface(
-            curvature=0.0 if flat else 1.0 / row.radius, conic=row.conic, asphere=row.asphere,
-            thickness=row.thickness, medium=medium, semi_diameter=row.semi_diameter or None,
-        )  # fmt: skip
-    except ValidationError as error:
-        problems += [f"{where}: {sentence}" for sentence in validation_sentences(error)]
-        return None
-    return SequenceRow(number=row.number, surface=surface, stop=row.stop)
+    return sequence_row(
+        where, problems, before, number=row.number, stop=row.stop, curvature=0.0 if flat else 1.0 / row.radius,
+        conic=row.conic, asphere=row.asphere, thickness=row.thickness, medium=medium,
+        semi_diameter=row.semi_diameter or None,
+    )  # fmt: skip

@@ -121,6 +121,3 @@ def _refuse_toroids(lens: Lens, kind: str) -> None:
     for k, row in enumerate(lens.rows):
         if isinstance(row, Surface) and row.toroidal:
             raise LensError(f"row {k} has different curvatures in its meridians, which a {kind} file cannot hold")
-
-
-__all__ = ["csv_text", "dotlens_text"]

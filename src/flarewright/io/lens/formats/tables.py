@@ -198,6 +198,3 @@ def _csv_row(number: int, given: dict[str, str], comma: bool, head: TableHead) -
             asphere=tuple(terms),
         )
     ]
-
-
-__all__ = ["read_csv_table", "read_dat"]

@@ -213,6 +213,3 @@ def _unpack_picture(archive: ZipFile, lens: PurePosixPath, picture: str, folder:
     target.parent.mkdir(parents=True, exist_ok=True)
     # the door has compared the sum of all sizes with its limit
     target.write_bytes(_unpacked(archive, archive.getinfo(member), label, archive.getinfo(member).file_size))
-
-
-__all__ = ["MOST_FILES", "Found", "LensFile", "lens_files"]

@@ -110,6 +110,3 @@ def _american(number: str) -> str:
     if len(plain) == 11:
         return f"{plain[:4]}/{plain[4:]}"
     return f"{int(plain):,}" if 5 <= len(plain) <= 8 else number
-
-
-__all__ = ["maker_of", "patent_of"]

@@ -117,16 +117,3 @@ def unused_name(text: str, taken: Container[str]) -> str:
     while key_of(name) in taken:
         name, number = f"{base}-{number}", number + 1
     return name
-
-
-__all__ = [
-    "LONGEST_NAME",
-    "key_of",
-    "lenses_folder",
-    "library_folder",
-    "own_lenses",
-    "spoken",
-    "thumbnail_file",
-    "unused_name",
-    "writable_folder",
-]

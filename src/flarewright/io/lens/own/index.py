@@ -79,6 +79,3 @@ def write_index(entries: dict[str, Entry]) -> None:
     lenses = {name: [entry.size, entry.changed_ns, as_json(entry.record)] for name, entry in sorted(entries.items())}
     text = json.dumps({"version": _VERSION, "lenses": lenses})
     write_text_atomically(index_path(), text, newline="\n")
-
-
-__all__ = ["Entry", "Index", "index_path", "read_index", "write_index"]

@@ -134,6 +134,3 @@ def record_in(text: str, name: str) -> tuple[LensRecord | None, bool]:
 
 def _digest(text: str) -> str:
     return sha256(text.encode("utf-8", "replace")).hexdigest()[:16]
-
-
-__all__ = ["LONGEST_REMARKS", "LensRecord", "as_json", "from_json", "record_in", "with_record"]

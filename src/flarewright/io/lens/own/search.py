@@ -100,6 +100,3 @@ def parse_range(text: str, flag: str) -> Range:
     except ValueError:
         raise ProjectError(f"{flag} {shorten(text)} is no range; write {flag} 50, 35-85, -35 or 85-") from None
     return ends if dash else (ends[0] * (1.0 - _ABOUT), ends[0] * (1.0 + _ABOUT))
-
-
-__all__ = ["Query", "Range", "matching", "parse_range"]

@@ -64,6 +64,3 @@ def _cells(operands: list[Operand], count: int) -> dict[Place, dict[int, str]]:
 def _points(axis: str, found: Text) -> list[float]:
     words = found.head.get(f"{axis}FLN") or found.head.get(f"{axis}FLD") or []
     return [number_of(word) or 0.0 for word in words]
-
-
-__all__ = ["configurations"]

@@ -17,17 +17,16 @@ from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 
-from pydantic import ValidationError
-
+from flarewright.colorimetry import VISIBLE_NM
 from flarewright.errors import GlassError
-from flarewright.model import Medium, Surface
+from flarewright.model import Medium
 from flarewright.model.lens.prescription import MOST_TERMS
 from flarewright.model.lens.raw_lens import Configuration, RawSequence, SequenceRow
 
 from ...files.door import shown
-from ...files.sentences import did_you_mean, shorten, validation_sentences
+from ...files.sentences import did_you_mean, shorten
 from .. import media
-from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_data, number_of, whole
+from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_data, number_of, sequence_row, whole
 from ..glass_catalogue import CatalogueGlass, by_name, same_name
 from ..lens_fields import CURVATURE, ROW_NUMBERS
 from .configurations import configurations
@@ -43,7 +42,6 @@ _AIR = ("AIR", "VACUUM")
 _AIR_TOLERANCE = 5e-4
 # a larger semi-diameter in mm is a misprint
 _WIDEST = 2000.0
-_VISIBLE_UM = (0.36, 0.83)
 # largest number of unknown keywords that are named
 _LISTED = 8
 _MOULDED = ("_MOLD", "_MOULD")
@@ -143,21 +141,12 @@ def _row(
         return None
     thickness = _gap(block, found) * mm
     values = _shape(block, mm, found) | {"thickness": thickness, "semi_diameter": _rim(block, mm, found)}
-    if refusal := CURVATURE.refuse(values.get("curvature", 0.0)):
-        problems.append(f"{where}: the curvature {refusal}")
+    values["medium"] = None
+    CURVATURE.read(values.get("curvature", 0.0), f"{where}: the curvature", problems)
     if glass:
         values["medium"] = _medium(block.number, glass, found, findings)
-        if thickness < 0.0:
-            problems.append(f"{where}: glass cannot be {thickness:g} mm thick")
-    if len(problems) > before:
-        return None
-    try:
-        return SequenceRow(
-            number=block.number, surface=Surface(**values), stop="STOP" in block.words, automatic_rim=_automatic(block)
-        )  # fmt: skip
-    except ValidationError as error:
-        problems += [f"{where}: {sentence}" for sentence in validation_sentences(error)]
-        return None
+    stop, automatic = "STOP" in block.words, _automatic(block)
+    return sequence_row(where, problems, before, number=block.number, stop=stop, automatic_rim=automatic, **values)
 
 
 def _glass_of(block: Block) -> list[str]:
@@ -443,7 +432,7 @@ def _remark_wavelength(found: Text) -> None:
     """Append a remark when the primary wavelength is invisible: the lens is then not made for a camera."""
     primary = int(number_of((found.head.get("PWAV") or ["1"])[0]) or 1)
     wavelength_um = found.wavelengths_um.get(primary)
-    if wavelength_um is not None and not _VISIBLE_UM[0] <= wavelength_um <= _VISIBLE_UM[1]:
+    if wavelength_um is not None and not VISIBLE_NM[0] <= 1000.0 * wavelength_um <= VISIBLE_NM[1]:
         found.remarks.append(
             f"the file's primary wavelength is {1000.0 * wavelength_um:g} nm, not visible: focal length and image hold "
             "at 587.6 nm here; flarewright lens show --wavelength gives others"
@@ -493,6 +482,3 @@ def _number(block: Block, key: str, problems: list[str]) -> float:
 def _length(block: Block, key: str, problems: list[str], infinite: float) -> float:
     words = block.words.get(key)
     return infinite if words and words[0].upper() == "INFINITY" else _number(block, key, problems)
-
-
-__all__ = ["read_zmx"]

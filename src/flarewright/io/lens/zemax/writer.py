@@ -179,6 +179,3 @@ def _configurations(states: Sequence[LensState]) -> list[str]:
         if len(set(values)) > 1:
             lines += [f"{key} {place:3d} {k:3d} {value} 0 0 0 1 1 1 0 0" for k, value in enumerate(values, 1)]
     return lines
-
-
-__all__ = ["LensState", "zmx_text"]
