@@ -207,7 +207,7 @@ def band_weights(
     colorspace : {"rec709", "acescg"}
     cubic : bool
         Integrate what is cubic between the nodes instead of linear, for nodes as dense as `sampled_wavelengths`: what
-        two films reflect can grow by a factor of 13 within 20 nm, and lines between nodes 5 nm apart are 3 % too bright.
+        two films reflect can grow by a factor of 13 within 20 nm, and lines between nodes 5 nm apart err by 3 %.
 
     Returns
     -------
