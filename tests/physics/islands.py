@@ -248,7 +248,7 @@ def measured(made: Setup, path: LightPath) -> tuple[float, float, Bundle | None]
 
 
 def confirm(made: Setup, path: LightPath, found: Found) -> oracle.Estimate | None:
-    """Integrate what the search found with the oracle; None for a lens with aspheric terms, which the oracle does not have."""
+    """Integrate what the search found with the oracle; None for aspheric terms, which the oracle does not have."""
     if any(row.kind != "stop" and row.terms for row in made.lens.rows):
         return None
     system = oracle.from_lens(made.lens)

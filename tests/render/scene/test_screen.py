@@ -7,7 +7,7 @@ import pytest
 
 from flarewright.editor.session.files import project_for_lens
 from flarewright.kernels.raster.bundle import measure_bundle
-from flarewright.model import Camera, Output
+from flarewright.model import Camera, Everywhere, Output, Standard
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.optics.rays.bundle import Refinement, trace_bundle, trace_grid
 from flarewright.render.ghosts.traced_ghosts import find_final
@@ -22,7 +22,11 @@ from flarewright.render.scene.shots import make_shots
 def exact_and_seen(lens):
     """Return the layers of a file's picture, and of a screen's."""
     size_px = (240, 135) if lens == "triplet-pestrecov" else (480, 270)
-    project = project_for_lens(lens).replace(camera=Camera(size_px=size_px), output=Output(layers="passes"))
+    # films that do not change when the library's choice does
+    films = Everywhere(coating=Standard(name="single-1950s"))
+    project = project_for_lens(lens).replace(
+        camera=Camera(size_px=size_px), output=Output(layers="passes"), coating=films
+    )
     return [
         {layer.name: layer.pixels for layer in render(each).layers}
         for each in (project, project.replace(quality=project.quality.replace(screen=True)))
