@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -370,6 +370,15 @@ def coating_word(choice: CoatingChoice) -> str:
     return f"preset:{choice.name}" if isinstance(choice, Preset) else "bare"
 
 
+def daylight_lines(nm: Floats, parts: int) -> Iterator[tuple[float, Lines]]:
+    """Yield daylight at some wavelengths, in parts of at most 81: the luminance of each, and its lines."""
+    power = spectral_power(D65(), nm)
+    light = cie_1931(nm)[:, 1] * power
+    for k in range(parts):
+        lines = tuple(zip(nm[k::parts].tolist(), power[k::parts].tolist(), strict=True))
+        yield float(light[k::parts].sum() / light.sum()), Lines(lines=lines)
+
+
 def pictures(scenes: Sequence[Scene]) -> None:
     """Print CIEDE2000 of whole pictures in daylight, against 61 lines; drafts against 480."""
     import colour
@@ -387,12 +396,9 @@ def pictures(scenes: Sequence[Scene]) -> None:
     for scene in scenes:
         for mode, count, lines, parts in (("final", 7, 61, 1), ("draft", 3, 480, 8)):
             nm = np.linspace(*VISIBLE_NM, lines) if mode == "final" else cells(np.linspace(*LIGHT_NM, lines + 1))[0]
-            power = spectral_power(D65(), nm)
-            light, exact = cie_1931(nm)[:, 1] * power, np.zeros((SIZE_PX[1], SIZE_PX[0], 3))
-            # a project has at most 81 wavelengths
-            for k in range(parts):
-                some = Lines(lines=tuple(zip(nm[k::parts].tolist(), power[k::parts].tolist(), strict=True)))
-                exact += light[k::parts].sum() / light.sum() * beauty(scene, some, len(some.lines), mode)
+            exact = np.zeros((SIZE_PX[1], SIZE_PX[0], 3))
+            for part, some in daylight_lines(nm, parts):
+                exact += part * beauty(scene, some, len(some.lines), mode)
             gain = 0.9 / float(np.quantile(exact.max(axis=2), 0.995))
             far = colour.delta_E(lab(gain * exact), lab(gain * beauty(scene, D65(), count, mode)), method="CIE 2000")
             word = f"{scene[0]}, {coating_word(scene[1])} | {mode}, {count}"
@@ -411,14 +417,8 @@ def sums() -> None:
         return found
 
     def of_lines(count: int) -> Floats:
-        nm = np.linspace(*VISIBLE_NM, count)
-        power = spectral_power(D65(), nm)
-        light, total = cie_1931(nm)[:, 1] * power, np.zeros(3)
-        # a project has at most 81 wavelengths
-        for k in range(2):
-            some = Lines(lines=tuple(zip(nm[k::2].tolist(), power[k::2].tolist(), strict=True)))
-            total += light[k::2].sum() / light.sum() * whole(some, len(some.lines), "final")
-        return total
+        ((_, lines),) = daylight_lines(np.linspace(*VISIBLE_NM, count), 1)
+        return whole(lines, count, "final")
 
     exact = of_lines(61)
     rows = [

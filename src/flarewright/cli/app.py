@@ -249,9 +249,8 @@ def _rings(words: Sequence[str]) -> bool:
 
 def _call(words: list[str]) -> int:
     """Convert every expected end of a command to an exit code, with one sentence on stderr."""
-    swallowed: list[object] = []
     try:
-        with _keeping_interrupts(swallowed):
+        with _hiding_interrupts():
             code: Any = app(args=words, prog_name="flarewright", standalone_mode=False)
     except FlarewrightError as error:
         return _fail(str(error), getattr(error, "problems", ()))
@@ -285,7 +284,7 @@ def _call(words: list[str]) -> int:
         # the interpreter's own word for a call from C that failed without a reason
         if isinstance(error, SystemError) and _memory_is_used_up():
             return _fail(_no_memory(words))
-        if not swallowed and not was_interrupted():
+        if not was_interrupted():
             raise
         code = 130
     if code == 130:
@@ -294,17 +293,15 @@ def _call(words: list[str]) -> int:
 
 
 @contextmanager
-def _keeping_interrupts(swallowed: list[object]) -> Iterator[None]:
-    """Record every Ctrl-C swallowed by a call from C, which Python cannot raise: its kernel is then not compiled."""
+def _hiding_interrupts() -> Iterator[None]:
+    """Print no Ctrl-C that a call from C swallows because Python cannot raise it: `was_interrupted` knows of it."""
     hook = sys.unraisablehook
 
-    def note(one: sys.UnraisableHookArgs) -> None:
-        if one.exc_type is KeyboardInterrupt:
-            swallowed.append(one.exc_type)
-        else:
+    def report(one: sys.UnraisableHookArgs) -> None:
+        if one.exc_type is not KeyboardInterrupt:
             hook(one)
 
-    sys.unraisablehook = note
+    sys.unraisablehook = report
     try:
         yield
     finally:

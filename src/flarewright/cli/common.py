@@ -84,7 +84,12 @@ def picture_size(text: str, flag: str = "--size") -> tuple[int, int]:
 def print_remarks(remarks: Iterable[str]) -> None:
     """Print remarks to stderr, one a line."""
     for remark in remarks:
-        print(f"flarewright: {remark}", file=sys.stderr)
+        print_remark(remark)
+
+
+def print_remark(remark: str) -> None:
+    """Print a remark to stderr."""
+    print(f"flarewright: {remark}", file=sys.stderr)
 
 
 def aperture_reading(text: str | None) -> Apertures:
@@ -252,7 +257,7 @@ def remembered(cache: Path | None, output: Path | None = None, unnamed: str = ""
     kept = cache or (_unnamed_partial(unnamed) if output is None else output.with_suffix(".partial.npz"))
     from ..io.render_state.flare_cache import read_cache, write_cache
 
-    memory = read_cache(kept, lambda line: print_remarks([line])) if kept.exists() else {}
+    memory = read_cache(kept, print_remark) if kept.exists() else {}
     stored = sum(map(len, memory.values()))
     if cache is None and stored:
         print_remarks([f"{kept}: resuming with {stored} pictures of an interrupted run"])
@@ -397,7 +402,10 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def was_interrupted() -> bool:
-    """Return whether a signal has asked this process to end: a module written in C may report it as an ImportError."""
+    """Return whether a signal has asked this process to end.
+
+    A call from C may swallow the KeyboardInterrupt, so that a kernel is not compiled, or report it as an ImportError.
+    """
     return bool(_received)
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import ProjectError
-from .common import check_place, first_run_bar, print_json, print_remarks, progress_bar
+from .common import check_place, first_run_bar, print_json, print_remark, print_remarks, progress_bar
 from .progress_lines import ProgressLines
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def dataset(
             report=report,
             prepare=_compile,
             cluster=cluster,
-            announce=lambda line: print_remarks([line]),
+            announce=print_remark,
         )
     print_remarks(result.remarks)
     seconds = time.monotonic() - started
@@ -170,7 +170,7 @@ def _compile(project: Project, threads: int) -> None:
     """Compile the kernels of an item, once for all processes."""
     from ..render.warmup import compile_for_render
 
-    compile_for_render(project, threads, lambda sentence: print_remarks([sentence]), first_run_bar)
+    compile_for_render(project, threads, print_remark, first_run_bar)
 
 
 @contextmanager

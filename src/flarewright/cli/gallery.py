@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import FlarewrightError, OutputError
-from .common import picture_size, print_json, print_remarks, progress_bar, write_text
+from .common import picture_size, print_json, print_remark, print_remarks, progress_bar, write_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -107,7 +107,7 @@ def _render(card: Card, size_px: tuple[int, int], path: Path) -> None:
     from ..render.gallery import card_picture, card_project
     from ..render.warmup import compile_for_render
 
-    compile_for_render(card_project(card, size_px), None, lambda sentence: print_remarks([sentence]))
+    compile_for_render(card_project(card, size_px), None, print_remark)
     about = {"Software": f"Flarewright {__version__}", "Description": card.command}
     write_png(path, card_picture(card, size_px), about)
 

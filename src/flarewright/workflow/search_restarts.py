@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from uuid import uuid4
 
-from ..errors import FlarewrightError, OutputError, ProjectError
-from ..io.files.atomic_write import write_bytes_atomically
+from ..errors import FlarewrightError, ProjectError
+from ..io.files.atomic_write import make_folder, write_bytes_atomically
 from ..jobs.cluster.executor import open_cluster, workers_of
 from ..jobs.processes import fitting, shares, work_off
 from ..jobs.worker import WRITING
@@ -268,12 +268,9 @@ def _elsewhere(
 def _folder(folder: Path) -> Path:
     """Return the folder of the states, without the marks of commands that were killed: their workers end."""
     path = folder / FOLDER
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        for mark in path.glob(f"{_RUNNING}*"):
-            mark.unlink(missing_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot make the folder {path}: {(error.strerror or str(error)).lower()}") from None
+    make_folder(path)
+    for mark in path.glob(f"{_RUNNING}*"):
+        mark.unlink(missing_ok=True)
     return path
 
 

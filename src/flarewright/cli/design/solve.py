@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ...errors import OutputError, ProjectError
-from ..common import checkpoints, print_json, print_remarks, stop_on_interrupt
+from ..common import checkpoints, print_json, print_remark, print_remarks, stop_on_interrupt
 from .checks import check_fitness, check_time
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ def _sharing(
 
     workers_of(cluster, processes, threads)
     if restarts > 1:
-        return Sharing(folder, processes, cluster, lambda line: print_remarks([line]))
+        return Sharing(folder, processes, cluster, print_remark)
     for flag, value in (("processes", processes), ("cluster", cluster)):
         if value is not None:
             raise ProjectError(
@@ -226,7 +226,7 @@ def search(
     with stop_on_interrupt() as asked, ExitStack() as watching:
         done = search_lenses(
             project, time_s=time_s, state=state, lenses=lenses, searches=searches, threads=threads, choice=choice,
-            measure=measure, name=name, report=lambda line: print_remarks([line]), progress=observer, cancelled=asked,
+            measure=measure, name=name, report=print_remark, progress=observer, cancelled=asked,
             sharing=sharing,
         )  # fmt: skip
     problem, found, proven, conflict = done.problem, done.outcomes, done.obstacles, done.conflict

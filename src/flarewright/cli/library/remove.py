@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from ..common import print_remarks
+from ..common import print_remark, print_remarks
 
 EPILOG = "The files that were added stay where they are: flarewright library add adds them again."
 
@@ -18,5 +18,5 @@ def remove(names: Annotated[list[str], typer.Argument(metavar="NAME...", help="L
     # a name that is wrong is reported before anything is removed
     found = list(dict.fromkeys(find_own(name)[0] for name in names))
     for name in found:
-        remove_lens(name, lambda remark: print_remarks([remark]))
+        remove_lens(name, print_remark)
         print_remarks([f"removed {name}"])

@@ -11,7 +11,7 @@ import typer
 
 from ...errors import FlarewrightError
 from ...workflow.measure_provenance import STAGES as AFTER_MERGING
-from ..common import print_json, print_remarks, progress_bar
+from ..common import print_json, print_remark, print_remarks, progress_bar
 from .stages import By, CorrectionsFile, Every, NoResidual
 
 if TYPE_CHECKING:
@@ -205,8 +205,8 @@ def _merge(
             threads=threads,
             progress=started,
             remarks=remarks,
-            report=lambda line: print_remarks([line]),
-            announce=lambda line: print_remarks([line]),
+            report=print_remark,
+            announce=print_remark,
         )
         write_overview(output, merged)
     return merged

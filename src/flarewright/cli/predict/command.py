@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import ProjectError
 from ...workflow.defaults import SHOWN_PX
-from ..common import check_place, console, pair, print_json, print_remarks, progress_bar, remembered, write_text
+from ..common import (
+    check_place,
+    console,
+    pair,
+    print_json,
+    print_remark,
+    print_remarks,
+    progress_bar,
+    remembered,
+    write_text,
+)
 from ..option_record import with_options
 from .options.record import PredictOptions
 from .scene import SceneRequest, is_scene, predict_scene
@@ -77,7 +87,7 @@ def predict(options: PredictOptions) -> None:
     measured = is_ghost_model_file(options.subject)
     with pictures_elsewhere(
         options.cluster, options.processes, options.threads, folder,
-        lambda line: print_remarks([line]),
+        print_remark,
     ) as spread:  # fmt: skip
         project, flares = (None, _of_model(options, size)) if measured else _of_lens(options, size or (36.0, 24.0))
         _curves(flares, wanted, project if options.glare else None, options, unnamed, spread)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import FlarewrightError, ProjectError, naming
-from ..common import console, print_json, print_remarks, progress_bar, remembered
+from ..common import console, print_json, print_remark, print_remarks, progress_bar, remembered
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -80,7 +80,7 @@ def predict_scene(path: Path, request: SceneRequest) -> None:
     with (
         pictures_elsewhere(
             request.cluster, request.processes, request.threads, folder,
-            lambda line: print_remarks([line]),
+            print_remark,
         ) as spread,
         remembered(request.cache, request.output, request.unnamed) as memory,
     ):  # fmt: skip

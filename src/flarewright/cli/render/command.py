@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import FlarewrightError, OutputError, ProjectError
-from ..common import check_place, first_run_bar, one_bar, print_json, print_remarks
+from ..common import check_place, first_run_bar, one_bar, print_json, print_remark, print_remarks
 from ..option_record import with_options
 from .options.record import RenderOptions
 from .preview import PreviewLook, check_exposure, preview_look, write_preview
@@ -290,7 +290,7 @@ def _kept_part(options: RenderOptions, project: Project) -> PartialPicture | Non
         return None
     from ...render.image.partial_picture import SUFFIX, PartialPicture
 
-    return PartialPicture(options.output.with_suffix(SUFFIX), lambda sentence: print_remarks([sentence]))
+    return PartialPicture(options.output.with_suffix(SUFFIX), print_remark)
 
 
 def _print_ledger(ledger: Ledger) -> None:
@@ -336,7 +336,7 @@ def _renderer(
 
     if options.profile and project.quality.mode != "final":
         raise ProjectError(f"--profile is for final quality, not for {project.quality.mode}; omit it")
-    compile_for_render(project, options.threads, lambda sentence: print_remarks([sentence]), first_run_bar)
+    compile_for_render(project, options.threads, print_remark, first_run_bar)
     return partial(
         render_project, project, threads=options.threads, run=run, ledger=options.ledger, profile=options.profile,
         kept=kept,

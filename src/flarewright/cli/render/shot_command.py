@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ...errors import ProjectError
-from ..common import first_run_bar, print_json, print_remarks, progress_bar
+from ..common import first_run_bar, print_json, print_remark, print_remarks, progress_bar
 from ..option_record import with_options
 from ..progress_lines import ProgressLines, print_line
 from .command import keep_inputs, project_of_options
@@ -76,7 +76,7 @@ def shot(options: ShotOptions) -> None:
             movie_exposure=options.exposure,
             encoded=encoded,
             cluster=options.cluster,
-            announce=lambda line: print_remarks([line]),
+            announce=print_remark,
             radiance=options.radiance,
         )
     remarks = [*remarks, *result.remarks]
@@ -270,7 +270,7 @@ def _compile(project: Project, threads: int) -> None:
     from ...render.warmup import compile_for_render
 
     if not is_measured(project):
-        compile_for_render(project, threads, lambda sentence: print_remarks([sentence]), first_run_bar)
+        compile_for_render(project, threads, print_remark, first_run_bar)
 
 
 _Report = Callable[["FrameResult", int, int], None]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import ProjectError
-from ..common import first_run_bar, one_bar, pair, picture_size, print_remarks
+from ..common import first_run_bar, one_bar, pair, picture_size, print_remark
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -193,7 +193,7 @@ def compile_places(project: Project) -> None:
     if not is_measured(project):
         from ...render.warmup import compile_for_render
 
-        compile_for_render(project, None, lambda sentence: print_remarks([sentence]), first_run_bar)
+        compile_for_render(project, None, print_remark, first_run_bar)
 
 
 def with_lights(given: tuple[GivenTrack, ...], names: Sequence[str]) -> tuple[GivenTrack, ...]:

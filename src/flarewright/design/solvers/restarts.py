@@ -9,9 +9,6 @@ import numpy as np
 from .polish import merge_pools
 from .pool_search import KEPT, PoolState
 
-MOST_RESTARTS = 1000
-"""Largest number of independent searches."""
-
 
 def restart_seed(seed: int, number: int) -> int:
     """Return the seed of an independent search.
