@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from fractions import Fraction
 
 import numpy as np
@@ -14,6 +17,7 @@ from film_samples import LOSSLESS, SIZE, lamp, write_sample
 
 from flarewright import Camera, Light, LightKey, Output, Project, Quality, Timeline, shot
 from flarewright.errors import FlarewrightError
+from flarewright.io.files.temporary_file import temporary_beside
 from flarewright.io.films.film_file import open_film
 from flarewright.io.films.film_frame import read_film_frame
 from flarewright.io.images.exr import read_exr
@@ -144,7 +148,9 @@ def test_an_interrupted_film_resumes_with_its_finished_parts(plates, tmp_path, m
     with pytest.raises(KeyboardInterrupt):
         assemble_film(files, tmp_path / "cut.mp4", report=stop)
     assert sorted(path.name for path in (tmp_path / "cut.mp4.parts").iterdir()) == ["00000.mp4", "00001.mp4"]
-    (tmp_path / "cut.mp4.parts" / ".00002.0123abcd.part.mp4").write_bytes(b"killed")
+    gone = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, check=True)
+    left = temporary_beside(tmp_path / "cut.mp4.parts" / "00002.mp4")
+    left.with_name(left.name.replace(f"-{os.getpid()}-", f"-{int(gone.stdout)}-")).write_bytes(b"killed")
     seen = []
     assemble_film(files, tmp_path / "cut.mp4", report=lambda frame, done, of: seen.append(done))
     assert seen == [16, 32, *range(33, 49)]

@@ -255,6 +255,7 @@ def remembered(cache: Path | None, output: Path | None = None, unnamed: str = ""
         Identifies the command, so that the same one finds them there.
     """
     kept = cache or (_unnamed_partial(unnamed) if output is None else output.with_suffix(".partial.npz"))
+    from ..io.files.atomic_write import delete_written
     from ..io.render_state.flare_cache import read_cache, write_cache
 
     memory = read_cache(kept, print_remark) if kept.exists() else {}
@@ -279,8 +280,7 @@ def remembered(cache: Path | None, output: Path | None = None, unnamed: str = ""
         raise
     finally:
         if cache is None and not failed:
-            with suppress(OSError):
-                kept.unlink()
+            delete_written(kept)
         else:
             try:
                 store()

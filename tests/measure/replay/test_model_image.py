@@ -2,6 +2,7 @@
 
 import ctypes
 import json
+import signal
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from planted_residual import CAPTURED, TRUE
 from planted_run import LARGEST, SIZE, views
 
 from flarewright.cli.app import run
+from flarewright.cli.common import end_as_interrupted
 from flarewright.errors import FlarewrightError
 from flarewright.io.images.exr import read_exr
 from flarewright.io.images.half import rounded_to_half
@@ -114,12 +116,13 @@ def test_ctrl_c_while_a_kernel_compiles_is_an_interrupt(tmp_path, capsys, monkey
     def compiling(*_, **__):
         @ctypes.CFUNCTYPE(None)
         def callback():
-            raise KeyboardInterrupt
+            signal.raise_signal(signal.SIGINT)
 
         callback()
         raise RuntimeError("no compiled object yet for a kernel")
 
     monkeypatch.setattr("flarewright.measure.replay.model_image.replay_model", compiling)
+    monkeypatch.setattr("flarewright.cli.common._received", [])
     write_ghost_model(tmp_path / "model.json", planted())
     arguments = [
         "measure",
@@ -130,7 +133,14 @@ def test_ctrl_c_while_a_kernel_compiles_is_an_interrupt(tmp_path, capsys, monkey
         "-o",
         str(tmp_path / "o.exr"),
     ]
-    assert run(arguments) == 130
+    kinds = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.getsignal(one) for one in kinds]
+    try:
+        end_as_interrupted()
+        assert run(arguments) == 130
+    finally:
+        for one, handler in zip(kinds, before, strict=True):
+            signal.signal(one, handler)
     assert capsys.readouterr().err == "flarewright: interrupted; nothing was left half-written\n"
 
 

@@ -59,6 +59,7 @@ def sources(options: SourcesOptions) -> None:
 
     Places and sizes are in pixels from the top left corner, brightness is the sum of plate values.
     """
+    from ...io.files.atomic_write import delete_written
     from ...plates.marked import light_rows
     from ...workflow.plates.plate_files import plate_frames
     from ...workflow.plates.plate_sources import plate_shot
@@ -83,7 +84,7 @@ def sources(options: SourcesOptions) -> None:
     if options.table is not None:
         _write_table(options.table, rows)
     if kept is not None:
-        kept.unlink(missing_ok=True)
+        delete_written(kept)
     print_remarks(found.remarks)
     if options.as_json:
         print_json(

@@ -3,7 +3,7 @@
 Readers call `text_file.read_toml` or `text_file.read_text` and turn validation errors into sentences with
 `sentences.validation_sentences`. Writers call `atomic_write.write_atomically`.
 
-- `atomic_write`: `write_atomically`, complete files or none; `make_folder`
+- `atomic_write`: `write_atomically`, complete files or none; `delete_written`, `make_folder`
 - `door`: `outside`, the one way to a file of the user; `sentences_for`, `refuse_claim`, `expanded`, `shown`
 - `file_lock`: `held`, `locked`, locks between processes
 - `file_kind`: `refuse_other_kind`, errors for a file of another kind than the wanted one
@@ -11,6 +11,7 @@ Readers call `text_file.read_toml` or `text_file.read_text` and turn validation 
 - `silence_libraries`: `silenced`, suppresses the output of libraries
 - `state_folder`: `state_folder`, the folder for data that outlives a run
 - `tar_members`: `tar_member`, `join_parts`, tar files joined from parts
+- `temporary_file`: `temporary_beside`, `remove_abandoned`, names of unfinished files and their removal after a kill
 - `text_file`: `read_text`, `read_toml`, `read_json`, `read_bytes`, `check_version`
 - `toml_errors`: `toml_sentence`, explains TOML syntax errors
 - `type_slips`: `record_of`, makes records without type conversion

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
 from collections.abc import Callable
 from pathlib import Path
 
 from flarewright.errors import OutputError
+
+from .temporary_file import remove_abandoned, temporary_beside
 
 
 def write_atomically(
@@ -38,14 +39,16 @@ def write_atomically(
 
     Notes
     -----
-    All other exceptions of `write` propagate after the temporary file is removed.
+    All other exceptions of `write` propagate after the temporary file is removed. What killed processes left of the
+    same file is removed first.
     """
     target = Path(path)
     if target.is_dir():
         raise OutputError(f"cannot write {target}: it is a folder; give a file name")
     if not target.parent.is_dir():
         raise OutputError(f"cannot write {target}: the folder {target.parent} does not exist; create it first")
-    temporary = target.with_name(f".{target.stem[:100]}.{secrets.token_hex(4)}.part{target.suffix}")
+    remove_abandoned(target)
+    temporary = temporary_beside(target)
     try:
         write(temporary)
         if not temporary.is_file():
@@ -65,6 +68,13 @@ def write_atomically(
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def delete_written(path: Path) -> None:
+    """Delete a file, if it exists, and what killed processes left of it; a file that cannot be deleted stays."""
+    with contextlib.suppress(OSError):
+        path.unlink(missing_ok=True)
+    remove_abandoned(path)
 
 
 def make_folder(folder: Path) -> None:

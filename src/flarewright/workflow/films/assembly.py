@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..._version import __version__
 from ...errors import OutputError, ProjectError
+from ...io.files.atomic_write import delete_written
 from ...io.files.text_file import digest_of
 from ...io.films.film_kind import is_film
 from ...io.films.film_time_code import code_text
@@ -196,10 +197,10 @@ def _join_parts(
             report(some[-1], at + len(some), len(film.frames))
         parts.append((some[0] - film.frames[0], part))
     join_films(film.output, parts, film.fps, time_code=code, comment=comment)
-    # also what a killed call has left
+    # also parts that a killed call made of a longer film
     for left in folder.iterdir():
-        if re.fullmatch(r"\d{5}|\.\d{5}\.[0-9a-f]{8}\.part", left.stem) and left.suffix in FILM_CODECS:
-            left.unlink(missing_ok=True)
+        if re.fullmatch(r"\d{5}", left.stem) and left.suffix in FILM_CODECS:
+            delete_written(left)
 
 
 def _pictures(
