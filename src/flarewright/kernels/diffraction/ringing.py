@@ -173,14 +173,14 @@ def draw_ringing(data, pupil, triangles, densities, patterns, axes, to_pixels, g
 def _draw_cell(bundle, start, end, texture, target, room):
     """Draw the triangles around a node as one polygon; return False if they must be drawn one by one.
 
-    A dark cell counts as drawn.
+    A cell of which nothing is seen counts as drawn.
     """
     _, table, corners, places = texture[:4]
     data, triangles, spots = bundle.data, bundle.triangles, bundle.spots
     height, width = plane_size(target.plane)
     count = _gather_cell(spots, bundle.blocked, triangles, start, end, width, height, room.polygon)
     if count <= 0:
-        return False
+        return count < 0
     inside = bundle.deep[triangles[start, 0]]
     for t in range(start, end):
         inside = inside and bundle.deep[triangles[t, 1]]

@@ -137,6 +137,9 @@ def draw_bundle(
             common = 0.0
             if end - start >= 4:
                 count = _gather_cell(spots, blocked, triangles, start, end, width, height, polygon)
+                if count < 0:
+                    start = end
+                    continue
                 alike = 1.0
                 if mask is not None and count > 0:
                     alike = _even_over_cell(data, triangles, start, end, mirror, crossings, axes, mask)
@@ -257,17 +260,25 @@ def _even_over_cell(data, triangles, start, end, mirror, crossings, axes, mask):
 
 @borrowing
 def _gather_cell(spots, blocked, triangles, start, end, width, height, polygon):
-    """Collect the border of a cell; return its number of vertices, 0 if it cannot be drawn as one polygon.
+    """Collect the border of a cell; return its number of vertices.
 
-    No edge may cut the cell, its map may not fold, and its border must be monotonic in y on both sides for
-    `fill_polygon`.
+    0: it cannot be drawn as one polygon. -1: nothing of it is seen. No edge may cut the cell, its map may not fold, and
+    its border must be monotonic in y on both sides for `fill_polygon`.
     """
     count = end - start
     centre = triangles[start, 0]
-    if blocked[centre] != 0:
-        return 0
     cx, cy = spots[centre, 0], spots[centre, 1]
     left, right, top, bottom = cx, cx, cy, cy
+    cuts, common = blocked[centre], blocked[centre] & ~SHARED
+    for t in range(start, end):
+        k = triangles[t, 1]
+        cuts, common = min(cuts, blocked[k]) if cuts < 0 else cuts | blocked[k], common & blocked[k]
+        left, right = min(left, spots[k, 0]), max(right, spots[k, 0])
+        top, bottom = min(top, spots[k, 1]), max(bottom, spots[k, 1])
+    if cuts >= 0 and (common != 0 or right <= 0.0 or left >= width or bottom <= 0.0 or top >= height):
+        return np.int64(-1)
+    if cuts != 0 or left < 0.0 or right > width or top < 0.0 or bottom > height:
+        return np.int64(0)
     low, high = np.inf, -np.inf
     turns = 0
     for m in range(count):
@@ -275,22 +286,21 @@ def _gather_cell(spots, blocked, triangles, start, end, width, height, polygon):
         following = t + 1 if m + 1 < count else start
         beyond = following + 1 if following + 1 < end else start
         a, b = triangles[t, 1], triangles[t, 2]
-        if blocked[a] != 0 or b != triangles[following, 1]:
-            return 0
+        if b != triangles[following, 1]:
+            return np.int64(0)
         ax, ay, bx, by = spots[a, 0], spots[a, 1], spots[b, 0], spots[b, 1]
         polygon[m, PX], polygon[m, PY] = ax, ay
         area = (ax - cx) * (by - cy) - (ay - cy) * (bx - cx)
         low, high = min(low, area), max(high, area)
-        left, right, top, bottom = min(left, ax), max(right, ax), min(top, ay), max(bottom, ay)
         if (by >= ay) != (spots[triangles[beyond, 1], 1] >= by):
             turns += 1
-    if left < 0.0 or right > width or top < 0.0 or bottom > height or low * high <= 0.0 or turns != 2:
-        return 0
+    if low * high <= 0.0 or turns != 2:
+        return np.int64(0)
     longest = max(right - left, bottom - top)
     # what is as thin as a line may have a border that crosses itself, of which `fill_polygon` would lose a part
     if longest > 2.0 and max(abs(low), abs(high)) < 0.5 * THIN * longest:
-        return 0
-    return count
+        return np.int64(0)
+    return np.int64(count)
 
 
 @borrowing

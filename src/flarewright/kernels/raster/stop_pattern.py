@@ -38,7 +38,7 @@ U, V, U_LOW, U_HIGH, V_LOW, V_HIGH, WAY = 0, 3, 6, 7, 8, 9, 10
 PLACE_COLUMNS = 11
 
 # pixels looked up in one vectorised step; rows of light are longer than the picture by this number
-TOGETHER = 32
+TOGETHER = 16
 
 
 @inlined
