@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flarewright.kernels.tracing.representative_rays import passing_area
 from flarewright.model import Camera, Light, Project, Quality
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.optics.rays.bundle import Refinement, trace_bundle, trace_grid
@@ -15,7 +14,6 @@ from flarewright.optics.rays.path_reflectance import CURVE_NM
 from flarewright.render.ghosts.paraxial_ghosts import matrix_fluxes
 from flarewright.render.ghosts.steep_ghosts import (
     ABRUPT_PART,
-    _areas_between,
     ends,
     gaps_at_ends,
     light_up_to_its_end,
@@ -24,7 +22,7 @@ from flarewright.render.ghosts.steep_ghosts import (
 from flarewright.render.ghosts.traced_ghosts import find_final
 from flarewright.render.scene.between_wavelengths import FINE_NM
 from flarewright.render.scene.opening import make_opening
-from flarewright.render.scene.path_color import visible_rays
+from flarewright.render.scene.path_color import areas_between, visible_rays
 from flarewright.render.scene.resolve import resolve_project
 from flarewright.render.scene.shot import at_fine_wavelengths
 from flarewright.render.scene.shots import make_shots
@@ -44,14 +42,18 @@ def test_interpolated_rays_pass_where_traced_ones_do(name):
     bundle = trace_grid(shot.packed, path, tilt, (opening.radius, opening.inner), item.region, detail)
     fine, seen = at_fine_wavelengths(shot).packed, visible_rays(shot, item.to_pixels, bundle.halves)
     alone = replace(bundle, traced={})
-    traced = [
-        sum(passing_area(bundle.pupil, bundle.triangles, half(trace_bundle(fine, w, alone, tilt))) for half in seen)
-        for w in range(len(FINE_NM))
-    ]
-    found = _areas_between(shot, bundle, FINE_NM, item.to_pixels)
+    a, b, c = np.moveaxis(bundle.pupil[bundle.triangles], 1, 0)
+    triangle = 0.5 * np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    third = np.bincount(bundle.triangles.ravel(), np.repeat(triangle / 3.0, 3), len(bundle.pupil))
+    traced = [sum(third[half(trace_bundle(fine, w, alone, tilt))].sum() for half in seen) for w in range(len(FINE_NM))]
+    found = areas_between(shot, bundle, FINE_NM, item.to_pixels)
     # of the three, one rises to 2.4 times its first value, two fall to a sixth and a fifth
     assert np.abs(found - traced).max() < 0.05 * max(traced)
     assert max(traced) > 1.15 * min(traced)
+    # nothing is interpolated at the wavelengths of the grid
+    held = sorted(bundle.traced)
+    at_held = areas_between(shot, bundle, shot.packed.wavelengths_nm[held], item.to_pixels)
+    np.testing.assert_allclose(at_held, [sum(third[half(bundle.traced[w])].sum() for half in seen) for w in held])
 
 
 def test_wavelengths_are_added_where_light_ends():

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flarewright.kernels.tracing.ray_interpolation import rays_between
 from flarewright.kernels.tracing.sequential import ALIVE, REL, STOP_X, WEIGHT
 from flarewright.model import Camera, Everywhere, Light, Lines, Project, Quality, QuarterWave
 from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.paths import direct_path, ghost_path
 from flarewright.optics.rays.bundle import Bundle
 from flarewright.optics.rays.pack import pack_lens, resolve_coatings
-from flarewright.render.ghosts.traced_ghosts import _between, draw_final, find_final
+from flarewright.render.ghosts.traced_ghosts import draw_final, find_final
 from flarewright.render.image.canvas import blank, merge
 from flarewright.render.scene.opening import make_opening
 from flarewright.render.scene.path_color import direct_flux, direct_spectrum, spread_rays, traced_spectrum, visible_rays
@@ -165,9 +166,11 @@ def test_interpolated_rays_keep_the_mean_and_follow_both_wavelengths():
     short, long = np.zeros((2, STOP_X + 2)), np.zeros((2, STOP_X + 2))
     short[:, ALIVE] = long[:, ALIVE] = 1.0
     short[:, WEIGHT], long[:, WEIGHT] = [0.5e-3, 1.5e-3], [1.2, 0.8]
-    data = _between(short, long, 0.5, (1e-3, 1.0))
+    data = rays_between(short, long, 0.5, 1e-3, 1.0)
     np.testing.assert_allclose(data[:, WEIGHT], 0.5005 * np.array([0.85, 1.15]))
-    np.testing.assert_allclose(_between(short, long, 0.5)[:, WEIGHT], 0.5 * (short + long)[:, WEIGHT])
+    np.testing.assert_allclose(rays_between(short, long, 0.5, 1.0, 1.0)[:, WEIGHT], 0.5 * (short + long)[:, WEIGHT])
+    short[0, ALIVE] = 0.0
+    np.testing.assert_array_equal(rays_between(short, long, 0.25, 1.0, 1.0)[:, ALIVE], [0.0, 1.0])
 
 
 def test_the_direct_light_follows_its_films():

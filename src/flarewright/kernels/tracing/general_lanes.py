@@ -48,7 +48,7 @@ LINEAR_MM = 3e-5
 
 
 @inner
-def trace_shapes(steps, lens, light, px, py, out):
+def trace_shapes(steps, lens, light, px, py, out, squares):
     """Trace rays as `kernels.tracing.sequential.trace_nodes` does, through rows of any shape.
 
     Parameters
@@ -60,6 +60,8 @@ def trace_shapes(steps, lens, light, px, py, out):
     out : ndarray, shape (N, 5 + 2 C)
         As in `trace_nodes`. A rim is decentred and tilted with its surface. For a ray that ended, the largest
         r / semi-diameter is that up to its end, and later crossings of the stop are 0.
+    squares : ndarray, shape (N, S), or None
+        As in `kernels.tracing.sequential.trace_lanes`.
     """
     rows, actions = steps
     shapes, z_vertex, inv_semi, n_gap, reflectance, sensor_z = lens
@@ -94,6 +96,8 @@ def trace_shapes(steps, lens, light, px, py, out):
                 for m in range(count):
                     out[start + m, STOP_X + 2 * crossing] = x[m] if alive[m] > 0.0 else 0.0
                     out[start + m, STOP_X + 2 * crossing + 1] = y[m] if alive[m] > 0.0 else 0.0
+                if squares is not None:
+                    squares[start : start + count, step] = 0.0
                 crossing += 1
                 continue
             mirror = 1.0 if actions[step] == REFLECT else 0.0
@@ -111,6 +115,9 @@ def trace_shapes(steps, lens, light, px, py, out):
                 living += alive[m]
             if living == 0.0:
                 break
+            if squares is not None:
+                for m in range(count):
+                    squares[start + m, step] = 0.0 if n_in == n_out else max(1.0 - cos_low[m] * cos_low[m], 0.0)
             table = reflectance[row]
             for m in range(LANES):
                 if alive[m] > 0.0:

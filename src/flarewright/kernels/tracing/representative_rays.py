@@ -1,4 +1,4 @@
-"""Representative rays of a bundle: their visibility, selection, angles of incidence, shift between two wavelengths."""
+"""Representative rays of a bundle: their visibility, selection, shift between two wavelengths."""
 
 from math import sqrt
 
@@ -6,8 +6,7 @@ import numpy as np
 
 from ..jit.decorators import borrowing, compiled
 from .clip import blade_value
-from .refract import ray_from_near
-from .sequential import ALIVE, REFLECT, REL, STOP_X, X, Y, hit_rays
+from .sequential import ALIVE, REL, STOP_X, X, Y
 
 
 @borrowing
@@ -80,140 +79,50 @@ def seen_rays(rays, iris_radius, blades, axes, place, width, height):
 
 
 @compiled
-def choose_representatives(pupil, triangles, passing, count):
+def choose_representatives(pupil, triangles, every, passing, count):
     """Choose nodes of a bundle, spread evenly over the area of the pupil that passes.
 
     Parameters
     ----------
     pupil : ndarray, shape (N, 2)
     triangles : ndarray, shape (T, 3), int64
-    passing : ndarray, shape (N,), bool
+    every : int
+        Use each `every`-th triangle.
+    passing : ndarray, shape (H, N), bool
+        For each half of the bundle. Both halves of a triangle are counted in a row, so that nodes are as many places of
+        the pupil as without halves.
     count : int
         Number of nodes to choose.
 
     Returns
     -------
     ndarray, int64
-        `count` nodes; empty if no node passes.
+        `count` nodes, plus N times their half; empty if no node passes.
     """
-    reached = np.empty(3 * triangles.shape[0])
+    halves, nodes = passing.shape
+    reached = np.empty(3 * halves * (-(-triangles.shape[0] // every)))
     total = 0.0
     corner = 0
-    for t in range(triangles.shape[0]):
+    for t in range(0, triangles.shape[0], every):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         x1, y1 = pupil[b, 0] - pupil[a, 0], pupil[b, 1] - pupil[a, 1]
         x2, y2 = pupil[c, 0] - pupil[a, 0], pupil[c, 1] - pupil[a, 1]
         area = abs(x1 * y2 - y1 * x2)
-        for m in range(3):
-            if passing[triangles[t, m]]:
-                total += area
-            reached[corner] = total
-            corner += 1
+        for half in range(halves):
+            for m in range(3):
+                if passing[half, triangles[t, m]]:
+                    total += area
+                reached[corner] = total
+                corner += 1
     chosen = np.empty(count if total > 0.0 else 0, dtype=np.int64)
     corner = 0
     for k in range(chosen.size):
         share = (k + 0.5) / count * total
         while corner + 1 < reached.size and reached[corner] < share:
             corner += 1
-        chosen[k] = triangles[corner // 3, corner % 3]
+        half = corner // 3 % halves
+        chosen[k] = triangles[corner // (3 * halves) * every, corner % 3] + half * nodes
     return chosen
-
-
-@compiled
-def passing_area(pupil, triangles, passing):
-    """Return the pupil area represented by the passing nodes of a bundle.
-
-    Parameters
-    ----------
-    pupil, triangles, passing
-        As in `choose_representatives`.
-
-    Returns
-    -------
-    float
-        mm^2; each node represents a third of the area of its triangles.
-    """
-    total = 0.0
-    for t in range(triangles.shape[0]):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        count = int(passing[a]) + int(passing[b]) + int(passing[c])
-        if count > 0:
-            x1, y1 = pupil[b, 0] - pupil[a, 0], pupil[b, 1] - pupil[a, 1]
-            x2, y2 = pupil[c, 0] - pupil[a, 0], pupil[c, 1] - pupil[a, 1]
-            total += count * abs(x1 * y2 - y1 * x2)
-    return total / 6.0
-
-
-@compiled
-def traced_squares(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, squares):
-    """Compute the angles of incidence of rays at the surfaces of a path.
-
-    Parameters
-    ----------
-    rows ... py
-        As in `kernels.tracing.sequential.hit_rays`.
-    squares : ndarray, shape (N, S)
-        Filled, from the first row, with the squared sine on the lower-index side at every step: 1 under total
-        reflection, 0 at the stop and where the index does not change.
-
-    Returns
-    -------
-    int
-        Number of rows filled; rays that end early have none.
-
-    Notes
-    -----
-    For a reflection |d' - d| = 2 cos. A refraction changes n d only along the normal (Snell's law in vector form), so
-    n d - n' d' is parallel to the normal.
-    """
-    steps = rows.shape[0]
-    hits = np.empty((px.shape[0], steps + 2, 3))
-    hit_rays(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits)
-    before, behind = np.empty(3), np.empty(3)
-    count = 0
-    for k in range(px.shape[0]):
-        if not np.isfinite(hits[k, steps + 1, 0] + hits[k, steps + 1, 1]):
-            continue
-        forward = True
-        for step in range(steps):
-            row = rows[step]
-            n_in, n_out = (n_gap[row], n_gap[row + 1]) if forward else (n_gap[row + 1], n_gap[row])
-            reflects = actions[step] == REFLECT
-            squares[count, step] = 0.0
-            if reflects:
-                forward = not forward
-            elif n_in == n_out:
-                continue
-            one, other = 0.0, 0.0
-            for axis in range(3):
-                at = hits[k, step + 1, axis]
-                before[axis], behind[axis] = at - hits[k, step, axis], hits[k, step + 2, axis] - at
-                one += before[axis] ** 2
-                other += behind[axis] ** 2
-            if step == 0:
-                # the plane of the first vertex may lie behind a concave front, or touch it
-                before[0], before[1], before[2], _ = ray_from_near(tilt, nearness, px[k], py[k])
-                one = before[0] ** 2 + before[1] ** 2 + before[2] ** 2
-            if one == 0.0 or other == 0.0:
-                continue
-            one, other = 1.0 / sqrt(one), 1.0 / sqrt(other)
-            if reflects:
-                turned = 0.0
-                for axis in range(3):
-                    turned += (behind[axis] * other - before[axis] * one) ** 2
-                ratio = max(n_in / n_out, 1.0)
-                square = (1.0 - 0.25 * turned) * ratio * ratio
-            else:
-                normal, along = 0.0, 0.0
-                for axis in range(3):
-                    incoming, outgoing = before[axis] * one, behind[axis] * other
-                    across = n_in * incoming - n_out * outgoing
-                    normal += across * across
-                    along += across * (incoming if n_in < n_out else outgoing)
-                square = 1.0 - along * along / normal if normal > 0.0 else 0.0
-            squares[count, step] = min(max(square, 0.0), 1.0)
-        count += 1
-    return count
 
 
 @compiled

@@ -29,7 +29,7 @@ from .refract import (  # fmt: skip
 
 __all__ = [
     "ALIVE", "KEEP", "LAND", "LANES", "REFLECT", "REFRACT", "REL", "STOP", "STOP_X", "WEIGHT", "X", "Y", "bend",
-    "hit_rays", "trace_hits", "trace_lanes", "trace_nodes",
+    "trace_hits", "trace_lanes", "trace_nodes", "trace_squares",
 ]  # fmt: skip
 
 
@@ -46,7 +46,7 @@ def _copy(source, target):
 
 
 @inner
-def trace_lanes(steps, lens, light, px, py, out):
+def trace_lanes(steps, lens, light, px, py, out, squares=None):
     """Trace rays of one light along one path to the sensor plane.
 
     Parameters
@@ -62,6 +62,9 @@ def trace_lanes(steps, lens, light, px, py, out):
         Filled, path by path, with x, y on the sensor, weight (product of R and T), largest r / semi-diameter, alive (1
         or 0), and x, y at each of the C stop crossings, 0 if a path has fewer. For a ray that ended, the first column
         is the number of surfaces it passed; all others except "alive" are undefined.
+    squares : ndarray, shape (N, S), or None
+        With P = 1, filled with the squared sine of incidence on the side of the lower index at every step: 1 under
+        total reflection, 0 at the stop and where the index does not change. Undefined for a ray that ended.
 
     Notes
     -----
@@ -70,7 +73,7 @@ def trace_lanes(steps, lens, light, px, py, out):
     light's ray is the irradiance at its start over that at the first vertex (`kernels.tracing.refract.ray_from_near`).
     """
     if len(lens) == SHAPED:
-        trace_shapes(steps, lens, light, px, py, out)
+        trace_shapes(steps, lens, light, px, py, out, squares)
         return
     rows, actions = steps
     curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z = lens
@@ -149,6 +152,8 @@ def trace_lanes(steps, lens, light, px, py, out):
                 for m in range(count):
                     out[begin + m, STOP_X + 2 * crossing] = x[m]
                     out[begin + m, STOP_X + 2 * crossing + 1] = y[m]
+                if squares is not None:
+                    squares[begin : begin + count, step] = 0.0
                 crossing += 1
                 continue
             c = curvature[row]
@@ -221,6 +226,9 @@ def trace_lanes(steps, lens, light, px, py, out):
                 living += alive[m]
             if living == 0.0:
                 continue
+            if squares is not None:
+                for m in range(count):
+                    squares[begin + m, step] = 0.0 if n_in == n_out else max(1.0 - cos_low[m] * cos_low[m], 0.0)
             table = reflectance[row]
             # a separate loop for the indices: the look-ups below would prevent its vectorisation
             for m in range(lanes):
@@ -244,8 +252,14 @@ def trace_nodes(steps, lens, light, px, py, out):
     trace_lanes(steps, lens, light, px, py, out)
 
 
-@inner
-def hit_rays(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits):
+@compiled
+def trace_squares(steps, lens, light, px, py, out, squares):
+    """Trace rays as `trace_lanes` does, with their angles of incidence; for calls from Python only."""
+    trace_lanes(steps, lens, light, px, py, out, squares)
+
+
+@compiled
+def trace_hits(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits):
     """Trace rays as `trace_lanes` does and record every hit, for drawings and for the sizes of surfaces.
 
     Parameters
@@ -297,9 +311,3 @@ def hit_rays(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, n
             t = (sensor_z - z) / dz
             last = rows.shape[0] + 1
             hits[k, last, 0], hits[k, last, 1], hits[k, last, 2] = x + t * dx, y + t * dy, sensor_z
-
-
-@compiled
-def trace_hits(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits):
-    """Trace rays as `hit_rays` does; for calls from Python only, kernels call `hit_rays`."""
-    hit_rays(rows, actions, curvature, conic, z_vertex, n_gap, sensor_z, tilt, nearness, px, py, hits)

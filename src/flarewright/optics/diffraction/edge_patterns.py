@@ -11,11 +11,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kernels.diffraction.corner_table import average_corner
 from ...typing import Floats, Pixels
 from ..pupil.blade_form import BladeForm, to_corner
 from ..pupil.iris import coverage, softened
@@ -140,13 +140,29 @@ def edge_tables(corner: Corner, margin: float = REACH) -> EdgeTables:
     """
     if corner.scale == 0.0:
         return _tables(corner.gamma, corner.blunt, _STRAIGHT_OFFSET, 0.0, margin)
-    octave = math.floor(math.log2(corner.scale))
-    nodes = 2.0**octave, 2.0 ** (octave + 1)
-    share = np.float32((corner.scale - nodes[0]) / (nodes[1] - nodes[0]))
-    low, high = (_tables(corner.gamma, corner.blunt, 1.0 / node, corner.curvature * node, margin) for node in nodes)
-    return EdgeTables(
-        (1 - share) * low.profile + share * high.profile, (1 - share) * low.corner + share * high.corner, low.first
-    )
+    if math.frexp(corner.scale)[0] == 0.5:
+        return _tables(corner.gamma, corner.blunt, 1.0 / corner.scale, corner.curvature * corner.scale, margin)
+    low, high, share = _octave(corner)
+    return _between(edge_tables(low, margin), edge_tables(high, margin), share)
+
+
+def _octave(corner: Corner) -> tuple[Corner, Corner, float]:
+    """Return a corner at the powers of two below and above its s, and the part of the higher one."""
+    low = 2.0 ** math.floor(math.log2(corner.scale))
+    return replace(corner, scale=low), replace(corner, scale=2.0 * low), corner.scale / low - 1.0
+
+
+def _between(low: EdgeTables, high: EdgeTables, share: float) -> EdgeTables:
+    """Interpolate tables, also averages, which are linear in the patterns; `share` is the part of `high`."""
+
+    def mixed(one: Pixels, other: Pixels) -> Pixels:
+        return np.float32(1.0 - share) * one + np.float32(share) * other
+
+    profile, excess = mixed(low.profile, high.profile), np.array([low.excess, high.excess])
+    border, moment, corner = ((1.0 - share) * excess[0] + share * excess[1]).tolist()
+    values = mixed(low.values, high.values)
+    around = values[: low.corner.size].reshape(low.corner.shape) if values.size else mixed(low.corner, high.corner)
+    return EdgeTables(profile, around, low.first, (border, moment, corner), values)
 
 
 @lru_cache(maxsize=32)
@@ -284,10 +300,15 @@ def averaged(form: BladeForm, scale: float, spread: float, pixel: float = 0.0) -
 @lru_cache(maxsize=KEPT_AVERAGES)
 def _averaged(corner: Corner, spread: float, pixel: float) -> EdgeTables:
     """Average tables over a band and a pixel."""
+    if corner.scale != 0.0 and math.frexp(corner.scale)[0] != 0.5:
+        # two averages serve an octave
+        low, high, share = _octave(corner)
+        return _between(_averaged(low, spread, pixel), _averaged(high, spread, pixel), share)
     band = _band(corner, spread, 0.5 * math.ceil(2.0 * (REACH + 0.5 + 0.5 * pixel)))
-    profile = _box_averaged(band.profile, 0, pixel * PROFILE_SAMPLES).astype(np.float32)
+    profile = _box_averaged(band.profile, pixel * PROFILE_SAMPLES)
     profile[0], profile[-1] = 1.0, 0.0
-    return replace(band, profile=profile, corner=_box_averaged_corner(band.corner, pixel * CORNER_SAMPLES)).laid_out()
+    around = _box_averaged_corner(band.corner, band.first, pixel * CORNER_SAMPLES)
+    return replace(band, profile=profile, corner=around).laid_out()
 
 
 @lru_cache(maxsize=KEPT_BANDS)
@@ -301,27 +322,14 @@ def _band(corner: Corner, spread: float, margin: float) -> EdgeTables:
     shares = (1.0 - np.abs(at)) / (1.0 - np.abs(at)).sum()
     ratios = np.exp(at * spread / math.sqrt(float(shares @ at**2)))
     ratios /= math.sqrt(float(shares @ ratios**2))
-    count = len(base.profile)
-    across = np.arange(count) - count // 2
-    profile, around = np.zeros(count), np.zeros_like(base.corner)
-    for ratio, share in zip(ratios, shares, strict=True):
-        profile += share * np.interp(across / ratio, across, base.profile)
-        around += np.float32(share) * _scaled(base.corner, base.first, 1.0 / ratio)
-    tables = EdgeTables(profile.astype(np.float32), around, base.first)
+    # the profile is a row of such a table
+    pair, across = np.empty((2, len(base.profile)), dtype=np.float32), np.tile(base.profile, (2, 1))
+    average_corner(across, len(base.profile) // 2, 1.0 / ratios, shares, 0, pair)
+    around = np.empty_like(base.corner)
+    if around.size:
+        average_corner(base.corner, base.first, 1.0 / ratios, shares, 0, around)
+    tables = EdgeTables(pair[0].copy(), around, base.first)
     return replace(tables, excess=_excess(corner, tables))
-
-
-def _scaled(corner: Pixels, first: int, ratio: float) -> Pixels:
-    """Resample a corner's table at `ratio` times the distance from it."""
-    for axis, origin in ((0, 0), (1, first)):
-        count = corner.shape[axis]
-        if count == 0:
-            return corner
-        at = np.clip((np.arange(count) - origin) * ratio + origin, 0.0, count - 1.001)
-        low = at.astype(np.intp)
-        part = np.expand_dims((at - low).astype(np.float32), 1 - axis)
-        corner = (1 - part) * corner.take(low, axis=axis) + part * corner.take(low + 1, axis=axis)
-    return corner
 
 
 def gain(form: BladeForm, scale: float, tables: EdgeTables) -> float:
@@ -345,27 +353,26 @@ def gain(form: BladeForm, scale: float, tables: EdgeTables) -> float:
     return open_area / (open_area + form.halves * half)
 
 
-def _box_averaged_corner(corner: Pixels, width: float) -> Pixels:
+def _box_averaged(profile: Pixels, width: float) -> Pixels:
+    """Average a profile over the odd number of samples that is nearest to `width`; its ends continue."""
+    side = _half_width(width)
+    sums = np.cumsum(np.pad(profile, (side + 1, side), mode="edge"), dtype=np.float64)
+    return np.asarray((sums[2 * side + 1 :] - sums[: len(profile)]) / (2 * side + 1), dtype=np.float32)
+
+
+def _box_averaged_corner(corner: Pixels, first: int, width: float) -> Pixels:
     """Average a corner's table over squares; it is even about its first row."""
-    if width < 2.0 or not corner.size:
+    side = _half_width(width)
+    if side < 1 or not corner.size:
         return corner
-    whole = np.concatenate([corner[:0:-1], corner])
-    return np.ascontiguousarray(
-        _box_averaged(_box_averaged(whole, 0, width), 1, width)[len(corner) - 1 :], dtype=np.float32
-    )
+    averaged = np.empty_like(corner)
+    average_corner(corner, first, np.ones(1), np.ones(1), side, averaged)
+    return averaged
 
 
-def _box_averaged(values: NDArray[Any], axis: int, width: float) -> Floats:
-    """Average along an axis over an odd number of samples near `width`; the ends are extended by their values."""
-    side = round(0.5 * (width - 1.0))
-    if side < 1:
-        return np.asarray(values, dtype=np.float64)
-    ends = [(0, 0)] * values.ndim
-    ends[axis] = (side + 1, side)
-    count, width = values.shape[axis], 2 * side + 1
-    sums = np.moveaxis(np.cumsum(np.pad(values, ends, mode="edge"), axis=axis, dtype=np.float64), axis, 0)
-    means: Floats = (sums[width : width + count] - sums[:count]) / width
-    return np.moveaxis(means, 0, axis)
+def _half_width(width: float) -> int:
+    """Return k of the odd number of samples, 2 k + 1, that is nearest to a width."""
+    return max(0, round(0.5 * (width - 1.0)))
 
 
 def _excess(corner: Corner, tables: EdgeTables) -> tuple[float, float, float]:

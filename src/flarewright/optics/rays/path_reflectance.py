@@ -15,7 +15,7 @@ import numpy as np
 
 from ...colorimetry import VISIBLE_NM
 from ...kernels.paraxial.path_reflectance import path_throughput, throughput_between
-from ...kernels.tracing.representative_rays import traced_squares
+from ...kernels.tracing.sequential import ALIVE, STOP_X, trace_squares
 from ...model import Coating, Lens, Medium, Stop
 from ...model.project.light import Spectrum
 from ...typing import Floats, Indices
@@ -25,6 +25,7 @@ from ..lens.dispersion import refractive_index
 from ..lens.paraxial import D_LINE_NM, gap_indices
 from ..lens.paths import LightPath
 from .pack import REFLECTANCE_SAMPLES, PackedLens, SensorMirror
+from .pupil_region import tracing_arguments
 
 # key of a surface: media in front and behind, indices and thicknesses of films in nm
 _Surface = tuple[Medium | None, Medium | None, tuple[float, ...], tuple[float, ...]]
@@ -278,10 +279,8 @@ def step_squares(packed: PackedLens, path: LightPath, tilt: float, points: Float
         Squared sines on the side of the lower index at every step; 1 under total reflection. Only rays that reach the
         sensor's plane, so N can be smaller.
     """
-    n = packed.n_gap[len(packed.n_gap) // 2 if wave is None else wave]
-    squares = np.empty((len(points), len(path.rows)))
-    count = traced_squares(
-        path.rows, path.actions, packed.curvature, packed.form, packed.z_vertex, n, packed.sensor_z, tilt,
-        packed.nearness, np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1]), squares,
-    )  # fmt: skip
-    return squares[:count]
+    wave = len(packed.n_gap) // 2 if wave is None else wave
+    data, squares = np.empty((len(points), STOP_X + 2 * path.stop_crossings)), np.empty((len(points), len(path.rows)))
+    x, y = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
+    trace_squares(*tracing_arguments(packed, wave, path, tilt), x, y, data, squares)
+    return squares[data[:, ALIVE] > 0.0]

@@ -51,7 +51,7 @@ def interpolation_error(
     drawn = (True,) * len(known_nm) if traced is None else tuple(traced.tolist())
     straight, bent = _interpolations(tuple(known_nm), drawn)
     # all light, also of a line between two of these wavelengths
-    passed, light = passed[..., ::EVERY], _hats(tuple(CURVE_NM[::EVERY])) @ light
+    passed, light = passed[..., ::EVERY], curve_hats(tuple(CURVE_NM[::EVERY])) @ light
     # not `@`, whose library threads busy-wait next to ours
     line = np.einsum("...w,wl->...l", throughput, straight)
     more = np.maximum(np.einsum("...w,wl->...l", throughput, bent), 0.0) - line
@@ -78,7 +78,7 @@ def gap_errors(passed: Floats, light: Floats, known_nm: Floats, throughput: Floa
     """
     straight, bent = _interpolations(tuple(known_nm), (True,) * len(known_nm))
     coarse_nm = CURVE_NM[::EVERY]
-    light = _hats(tuple(coarse_nm)) @ light
+    light = curve_hats(tuple(coarse_nm)) @ light
     line = np.einsum("pw,wl->pl", throughput, straight)
     more = np.maximum(np.einsum("pw,wl->pl", throughput, bent), 0.0) - line
     gap = np.clip(np.searchsorted(known_nm, coarse_nm) - 1, 0, len(known_nm) - 2)
@@ -146,13 +146,14 @@ def throughput_ratios(lit: Mask, traced_nm: Floats, throughput: Floats, fine: Fl
         Correction factors: ratios times shares times `throughput`, summed over W, is `fine`.
     """
     shares = np.zeros((len(traced_nm), len(CURVE_NM)))
-    shares[lit] = _hats(tuple(traced_nm[lit]))
+    shares[lit] = curve_hats(tuple(traced_nm[lit]))
     known = np.einsum("pw,wl->pl", throughput, shares)
     return shares, fine / known
 
 
 @lru_cache(maxsize=64)
-def _hats(nodes_nm: tuple[float, ...]) -> Floats:
+def curve_hats(nodes_nm: tuple[float, ...]) -> Floats:
+    """Return how each of `CURVE_NM` is split between some wavelengths, as `optics.colour.spectrum.hats` does."""
     return hats(CURVE_NM, nodes_nm)
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...kernels.tracing.sequential import ALIVE, WEIGHT
+from ...kernels.tracing.torn_triangles import find_torn
 from ...typing import Floats, Indices, Mask
 from .bundle import Bundle
 
@@ -35,16 +36,12 @@ def cut_failed_triangles(bundle: Bundle, data: Floats) -> tuple[Bundle, Floats]:
     Failure has no smooth measure, unlike a rim, that could place the cut. Along a border that crosses cells at random,
     cuts at the middles of edges add as much area as they lose.
     """
-    alive = data[:, ALIVE] > 0.0
-    if alive.all():
-        return bundle, data
-    passing = alive.take(bundle.triangles)
-    first, second, third = passing.T
-    torn = np.flatnonzero((first != second) | (second != third))
+    torn = find_torn(data, bundle.triangles)
     if not len(torn):
         return bundle, data
+    alive = data[:, ALIVE] > 0.0
     slopes = _slopes(bundle, data, alive, torn)
-    passing = passing[torn]
+    passing = alive[bundle.triangles[torn]]
     # rotate until the first ray passes and the last one fails
     turn = np.argmax(passing & ~np.roll(passing, 1, axis=1), axis=1)
     a, b, c = (bundle.triangles[torn, (turn + k) % 3] for k in range(3))

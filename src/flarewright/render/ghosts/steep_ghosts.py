@@ -8,25 +8,23 @@ are ghosts whose throughput at the traced wavelengths and at the ends of the spe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
-from itertools import permutations
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...kernels.raster.bundle import draw_bundle, node_densities
-from ...kernels.tracing.representative_rays import passing_area
-from ...kernels.tracing.sequential import ALIVE, WEIGHT
+from ...kernels.tracing.sequential import WEIGHT
 from ...optics.rays.bundle import Bundle, trace_bundle
 from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum
 from ...optics.rays.steepness import bright_wavelengths, gap_errors, interpolation_error, throughput_ratios
 from ...optics.rays.torn_cells import cut_failed_triangles
 from ...typing import Floats, Mask
 from ..image.canvas import blank
-from ..scene.path_color import RayFilter, visible_rays
+from ..scene.path_color import areas_between
 from ..scene.shot import Shot, seen_light
 
 # lowest expected colour error for a correction, relative to the ghost's largest channel
@@ -57,8 +55,6 @@ BISECTIONS = 5
 # places and shares of Gauss' rule from 0 to 1 (Abramowitz and Stegun 1964, 25.4.30)
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 ROOTS, SHARES = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
-# rounding error of a sum of weights that is 1
-ROUNDING = 1e-9
 
 
 def steepness(
@@ -89,12 +85,12 @@ def steepness(
     fitted = np.flatnonzero(drawn)[sorted(bundle.traced)]
     few = np.unique([0, *fitted, len(known_nm) - 1])
     throughput = np.empty(len(known_nm))
-    throughput[few] = first = _areas_between(shot, bundle, known_nm[few], to_pixels)
+    throughput[few] = first = areas_between(shot, bundle, known_nm[few], to_pixels)
     # without a traced wavelength that shows the ghost, extrapolation is too rough to draw it at 21
     if not first[drawn[few]].any() or first.max() - first.min() <= LEAST_CHANGE * first.max():
         return "not"
     others = np.setdiff1d(np.arange(len(known_nm)), few)
-    throughput[others] = _areas_between(shot, bundle, known_nm[others], to_pixels)
+    throughput[others] = areas_between(shot, bundle, known_nm[others], to_pixels)
     passed = np.ones(len(CURVE_NM)) if spectrum is None else spectrum.passed
     error, total = interpolation_error(passed, seen_light(shot), known_nm, throughput, drawn)
     if not error > COLOR_ERROR * total and not _begins_in_a_gap(shot, passed, known_nm, throughput):
@@ -175,43 +171,6 @@ def _fluxes(shot: Shot, bundle: Bundle, waves: list[int], to_pixels: Floats) -> 
         )  # fmt: skip
         found[k] = canvas.plane()[..., 0, :].sum(dtype=np.float64)
     return found
-
-
-def _area_of(bundle: Bundle, rays: Floats, seen: Sequence[RayFilter]) -> float:
-    """Return the visible area of the pupil, in both halves of a bundle, mm^2."""
-    return float(sum(passing_area(bundle.pupil, bundle.triangles, one(rays)) for one in seen))
-
-
-def _areas_between(shot: Shot, bundle: Bundle, wavelengths_nm: Floats, to_pixels: Floats) -> Floats:
-    """Return the visible area of the pupil, mm^2; rays are interpolated between those of the grid, or extrapolated.
-
-    Indices of glass are nearly linear in 1 / wavelength^2 (Cauchy), and so are rays: through three wavelengths they are
-    polynomials in it.
-    """
-    seen, held = visible_rays(shot, to_pixels, bundle.halves), sorted(bundle.traced)
-    held_nm = shot.packed.wavelengths_nm[held]
-    areas = np.empty(len(wavelengths_nm))
-    for k, shares in enumerate(_lagrange(tuple(held_nm**-2.0), tuple(wavelengths_nm**-2.0))):
-        data = bundle.traced[held[int(np.abs(held_nm - wavelengths_nm[k]).argmin())]]
-        if not (shares == 1.0).any():
-            nearest, data = data, shares[0] * bundle.traced[held[0]]
-            with np.errstate(invalid="ignore"):
-                for share, w in zip(shares[1:], held[1:], strict=True):
-                    data += share * bundle.traced[w]
-            # a ray that ends at one wavelength is unknown elsewhere: it counts as at the nearest wavelength
-            ended = ~(np.abs(data[:, ALIVE] - 1.0) < ROUNDING)
-            data[ended] = nearest[ended]
-        areas[k] = _area_of(bundle, data, seen)
-    return areas
-
-
-@lru_cache(maxsize=64)
-def _lagrange(nodes: tuple[float, ...], places: tuple[float, ...]) -> Floats:
-    """Return the weights of values at nodes for the polynomial through them at other places, shape (M, N)."""
-    weights = np.ones((len(places), len(nodes)))
-    for j, k in permutations(range(len(nodes)), 2):
-        weights[:, j] *= (np.array(places) - nodes[k]) / (nodes[j] - nodes[k])
-    return weights
 
 
 def steep_paths(

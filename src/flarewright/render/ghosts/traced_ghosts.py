@@ -18,8 +18,8 @@ import numpy as np
 
 from ...kernels.raster.bundle import draw_bundle, measure_bundle, node_densities
 from ...kernels.tracing.iris_edge import bounded_by_iris
+from ...kernels.tracing.ray_interpolation import rays_between
 from ...kernels.tracing.representative_rays import shift_quantile
-from ...kernels.tracing.sequential import ALIVE, WEIGHT
 from ...model import Quality
 from ...optics.lens.paths import LightPath
 from ...optics.pupil.polygon import mapped, points
@@ -272,7 +272,7 @@ def _draw_in_all(
             continue
         data = traced[w]
         if part > 0.0:
-            data = _between(data, traced[w + 1], part, (1.0, 1.0) if carried is None else (carried[w], carried[w + 1]))
+            data = rays_between(data, traced[w + 1], part, *((1.0, 1.0) if carried is None else carried[w : w + 2]))
         whole, data = cut_failed_triangles(bundle, data)
         watch.lap("between")
         densities = node_densities(data, whole.pupil, whole.triangles)
@@ -459,20 +459,3 @@ def _bridges(
     # use a quantile: the nodes that move farthest carry hardly any light
     gaps = [shift_quantile(short, long, iris_radius, view_radius, SHIFT_QUANTILE) for short, long in pairwise(traced)]
     return [min(max(ceil(gap * steps_per_mm), 1), most) for gap in gaps]
-
-
-def _between(short: Floats, long: Floats, part: float, carried: tuple[float, float] = (1.0, 1.0)) -> Floats:
-    """Interpolate a bundle between two wavelengths; a ray is alive if it is alive at both.
-
-    Where coatings pass far more at one wavelength than at the other, a ray's weight relative to the mean, `carried`, is
-    interpolated: the dark wavelength is as informative about the distribution of light as the bright one.
-    """
-    # a ray that ended can hold infinite values at either wavelength
-    with np.errstate(invalid="ignore"):
-        data = (1.0 - part) * short + part * long
-        if carried[0] != carried[1] and min(carried) > 0.0:
-            mean = (1.0 - part) * carried[0] + part * carried[1]
-            relative = (1.0 - part) / carried[0] * short[:, WEIGHT] + part / carried[1] * long[:, WEIGHT]
-            data[:, WEIGHT] = mean * relative
-    data[:, ALIVE] = np.minimum(short[:, ALIVE], long[:, ALIVE])
-    return data

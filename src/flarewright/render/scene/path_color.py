@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import lru_cache, partial
+from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kernels.tracing.ray_interpolation import visible_areas
 from ...kernels.tracing.representative_rays import choose_representatives, seen_rays
 from ...model import Lens
 from ...optics.colour.spectrum import hats
 from ...optics.lens.paths import LightPath, direct_path
 from ...optics.rays.bundle import Bundle
 from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum, path_spectra, step_squares
+from ...optics.rays.steepness import curve_hats
 from ...typing import Floats, Mask
 from .shot import Shot, seen_light
 
@@ -25,6 +28,8 @@ LEAST_SHARE = 0.02
 # number of triangles of the grid among which they are chosen
 TRIANGLES = 4096
 
+# x of the meridional frame changes its sign in the mirror image of a bundle
+_MIRRORED_AXES, _MIRRORED_PLACES = np.array([[[1.0], [1.0]], [[-1.0], [1.0]]]), np.array([[[1, 1, 1]], [[1, -1, 1]]])
 # a mask of the traced rays that pass
 RayFilter = Callable[[Floats], Mask]
 
@@ -76,13 +81,19 @@ def _sampled_spectrum(
     if not found_nm:
         return None
     # other rays of a ghost land in the picture at other wavelengths, at other angles
-    curves = np.einsum("wl,whl->hl", hats(CURVE_NM, found_nm), np.stack(passed))
+    found = tuple(found_nm)
+    curves = np.einsum("wl,whl->hl", curve_hats(found), np.stack(passed))
     spectrum = PathSpectrum(
-        curves.mean(axis=0), np.einsum("wl,wl->l", hats(shot.packed.wavelengths_nm, found_nm), np.stack(carried))
+        curves.mean(axis=0), np.einsum("wl,wl->l", _split(tuple(shot.packed.wavelengths_nm), found), np.stack(carried))
     )
     # not `@`, whose library threads busy-wait next to ours
     difference, color = np.einsum("kl,lc->kc", np.stack([curves[0] - curves[1], spectrum.passed]), seen_light(shot))
     return spectrum, float(np.abs(difference).max() / max(np.abs(color).max(), np.finfo(np.float64).tiny))
+
+
+@lru_cache(maxsize=64)
+def _split(wavelengths_nm: tuple[float, ...], nodes_nm: tuple[float, ...]) -> Floats:
+    return hats(np.array(wavelengths_nm), nodes_nm)
 
 
 def _representative_rays(
@@ -99,13 +110,10 @@ def _representative_rays(
     light = np.abs(shot.weights(shot.packed.wavelengths_nm[waves])).sum(axis=1)
     shares = light / max(light.sum(), np.finfo(np.float64).tiny)
     counts = np.where(shares < LEAST_SHARE, 0, 2 * np.ceil(0.5 * count * shares)).astype(np.int64)
-    anywhere = np.zeros((2, 3)), (np.inf, np.inf)
-    looks = (
-        visible_rays(shot, to_pixels, bundle.halves),
-        _visible(shot, *anywhere, bundle.halves),
-        _visible(shot, *anywhere, bundle.halves, blades=np.empty((0, 4))),
-    )
-    for seen in looks:
+    in_picture, anywhere = (pixel_frame(shot, to_pixels), shot.size_px), (np.zeros((2, 3)), (np.inf, np.inf))
+    no_blades = np.empty((0, 4))
+    for (place, size_px), blades in ((in_picture, None), (anywhere, None), (anywhere, no_blades)):
+        seen = _visible(shot, place, size_px, bundle.halves, blades)
         chosen = [(w, spread_rays(bundle, (w,), seen, n)[0]) for w, n in zip(waves, counts, strict=True) if n > 0]
         if found := [(w, rays) for w, rays in chosen if rays.size > 0]:
             return found
@@ -139,16 +147,13 @@ def spread_rays(
     halves : ndarray of int
         The half of the bundle in which each was chosen.
     """
-    halves, nodes = len(passes), len(bundle.pupil)
-    passing = np.full((halves, nodes), not waves)
+    nodes = len(bundle.pupil)
+    passing = np.full((len(passes), nodes), not waves)
     for w in waves:
-        passing |= [one(bundle.traced[w]) for one in passes]
-    few = bundle.triangles[:: max(1, len(bundle.triangles) // TRIANGLES)]
-    # both halves of a triangle in a row, so that rays are as many places of the pupil as without halves
-    triangles = np.stack([few + half * nodes for half in range(halves)], axis=1).reshape(-1, 3)
-    chosen: NDArray[np.intp] = choose_representatives(
-        np.concatenate([bundle.pupil] * halves), triangles, passing.ravel(), count
-    )
+        for half, one in enumerate(passes):
+            passing[half] |= one(bundle.traced[w])
+    every = max(1, len(bundle.triangles) // TRIANGLES)
+    chosen: NDArray[np.intp] = choose_representatives(bundle.pupil, bundle.triangles, every, passing, count)
     return chosen % nodes, chosen // nodes
 
 
@@ -179,13 +184,58 @@ def _visible(
     opening, width, height = shot.opening, float(size_px[0]), float(size_px[1])
     blades = opening.blades if blades is None else blades
 
-    def seen(mirror: float, rays: Floats) -> Mask:
-        # x of the meridional frame changes its sign
-        axes, where = shot.incidence.axes * [[mirror], [1.0]], place * [1.0, mirror, 1.0]
+    def seen(axes: Floats, where: Floats, rays: Floats) -> Mask:
         mask: Mask = seen_rays(rays, opening.radius, blades, axes, where, width, height)
         return mask
 
-    return tuple(partial(seen, mirror) for mirror in (1.0, -1.0)[:halves])
+    return tuple(partial(seen, axes, where) for axes, where in zip(*_frames(shot, place, halves), strict=True))
+
+
+def _frames(shot: Shot, place: Floats, halves: int) -> tuple[Floats, Floats]:
+    """Return axes and place of each half of a bundle, as kernels read them, shape (halves, 2, 2) and (halves, 2, 3)."""
+    return shot.incidence.axes * _MIRRORED_AXES[:halves], place * _MIRRORED_PLACES[:halves]
+
+
+def areas_between(shot: Shot, bundle: Bundle, wavelengths_nm: Floats, to_pixels: Floats) -> Floats:
+    """Return the visible area of the pupil, mm^2; rays are interpolated between those of the grid, or extrapolated.
+
+    Indices of glass are nearly linear in 1 / wavelength^2 (Cauchy), and so are rays: through three wavelengths they are
+    polynomials in it.
+
+    Parameters
+    ----------
+    shot : Shot
+    bundle : Bundle
+        Traced at a few wavelengths.
+    wavelengths_nm : ndarray, shape (M,)
+    to_pixels : ndarray, shape (4,)
+        Of the shot or of a ghost.
+
+    Returns
+    -------
+    ndarray, shape (M,)
+        In both halves of the bundle.
+    """
+    held = sorted(bundle.traced)
+    held_nm = shot.packed.wavelengths_nm[held]
+    shares = _lagrange(tuple(held_nm**-2.0), tuple(wavelengths_nm**-2.0))
+    nearest = np.abs(held_nm - wavelengths_nm[:, None]).argmin(axis=1)
+    axes, places = _frames(shot, pixel_frame(shot, to_pixels), bundle.halves)
+    width, height = (float(side) for side in shot.size_px)
+    areas: Floats = visible_areas(
+        np.stack([bundle.traced[w] for w in held]), shares, nearest, bundle.pupil, bundle.triangles,
+        shot.opening.radius, shot.opening.blades, axes, places, width, height,
+    )  # fmt: skip
+    return areas
+
+
+@lru_cache(maxsize=64)
+def _lagrange(nodes: tuple[float, ...], places: tuple[float, ...]) -> Floats:
+    """Return the weights of values at nodes for the polynomial through them at other places, shape (M, N)."""
+    weights = np.ones((len(places), len(nodes)))
+    for j, k in permutations(range(len(nodes)), 2):
+        weights[:, j] *= (np.array(places) - nodes[k]) / (nodes[j] - nodes[k])
+    return weights
 
 
 def pixel_frame(shot: Shot, to_pixels: Floats) -> Floats:
