@@ -1,5 +1,6 @@
 """The pool search finds planted lenses, stays inside its bounds, and resumes an interrupted search."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -266,6 +267,11 @@ def test_a_damaged_search_is_no_traceback(tmp_path):
             read_state(path)
     write_state(PoolState(3), path)
     assert read_state(path) == PoolState(3)
+    # each restart is prepared before the first one starts
+    many = {**json.loads(path.read_text()), "restarts": 10**9}
+    path.write_text(json.dumps({key: value for key, value in many.items() if key != "digest"}))
+    with pytest.raises(ProjectError, match="damaged or no search"):
+        read_state(path)
 
 
 def test_a_batch_is_a_function_of_its_seed():

@@ -19,6 +19,8 @@ from .pool_search import PoolState, Run
 VERSION = 1
 # bytes; a search of days has some megabytes
 _LARGEST = 256_000_000
+# as many searches as `flarewright design solve --restarts` starts
+_MOST_RESTARTS = 1000
 
 
 def write_state(state: PoolState, path: Path, name: str | None = None) -> None:
@@ -94,6 +96,8 @@ def read_search(path: Path) -> tuple[PoolState, str | None]:
             tuple(_read_candidate(one) for one in data["ended"]), int(data["next_run"]), int(data["searches"]),
             float(data["seconds"]), int(data.get("restarts", 1)),
         )  # fmt: skip
+        if not 1 <= state.restarts <= _MOST_RESTARTS:
+            raise ValueError("an impossible number of searches")
         return state, data.get("name")
     except FileError as error:
         if not path.is_file():
