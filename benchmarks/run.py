@@ -35,6 +35,7 @@ from benchmarks.design import design
 from benchmarks.lights import area, lights, surfaces
 from benchmarks.passes import passes
 from benchmarks.scaling import peak_mb, scaling
+from benchmarks.shots import shots
 from benchmarks.small import RATIOS, elsewhere, small, surely_lost
 from benchmarks.suite import SIZES, suite
 from benchmarks.yardstick import RAY_SURFACES, trace_plainly
@@ -69,8 +70,8 @@ from flarewright.render.scene.shots import make_shots
 
 PARTS = (
     "yardsticks", "trace", "raster", "frame", "passes", "art", "built", "lights", "area", "surfaces", "scatter",
-    "ringing", "reference", "design", "residual", "startup", "memory", "small", "dataset", "cluster", "scaling",
-    "suite",
+    "ringing", "reference", "design", "residual", "startup", "memory", "small", "dataset", "cluster", "shots",
+    "scaling", "suite",
 )  # fmt: skip
 
 LIGHT = (10.0, 5.0)
@@ -510,6 +511,7 @@ def main(arguments: list[str] | None = None) -> None:
         "small": lambda: small(row, given.repeat),
         "dataset": lambda: pairs(row),
         "cluster": lambda: cluster(row, os.cpu_count() or 1),
+        "shots": lambda: shots(row, given.repeat),
         "scaling": lambda: scaling(row, os.cpu_count() or 1),
         "suite": lambda: suite(row, scalar, given.repeat, given.lens, given.size),
     }
