@@ -138,16 +138,19 @@ def edge_tables(corner: Corner, margin: float = REACH) -> EdgeTables:
     borders do not affect the tables. Tables of curved blades are linear in s between powers of two: the effect of
     curvature is of the order of fringes over radii, and the error is of its square.
     """
-    if corner.scale == 0.0:
-        return _tables(corner.gamma, corner.blunt, _STRAIGHT_OFFSET, 0.0, margin)
-    if math.frexp(corner.scale)[0] == 0.5:
-        return _tables(corner.gamma, corner.blunt, 1.0 / corner.scale, corner.curvature * corner.scale, margin)
-    low, high, share = _octave(corner)
-    return _between(edge_tables(low, margin), edge_tables(high, margin), share)
+    if (between := _octave(corner)) is not None:
+        low, high, share = between
+        return _between(edge_tables(low, margin), edge_tables(high, margin), share)
+    offset, curvature = (
+        (1.0 / corner.scale, corner.curvature * corner.scale) if corner.scale else (_STRAIGHT_OFFSET, 0.0)
+    )
+    return _tables(corner.gamma, corner.blunt, offset, curvature, margin)
 
 
-def _octave(corner: Corner) -> tuple[Corner, Corner, float]:
-    """Return a corner at the powers of two below and above its s, and the part of the higher one."""
+def _octave(corner: Corner) -> tuple[Corner, Corner, float] | None:
+    """Return a corner at the powers of two below and above its s, and the part of the higher; None if it is at one."""
+    if corner.scale == 0.0 or math.frexp(corner.scale)[0] == 0.5:
+        return None
     low = 2.0 ** math.floor(math.log2(corner.scale))
     return replace(corner, scale=low), replace(corner, scale=2.0 * low), corner.scale / low - 1.0
 
@@ -158,11 +161,10 @@ def _between(low: EdgeTables, high: EdgeTables, share: float) -> EdgeTables:
     def mixed(one: Pixels, other: Pixels) -> Pixels:
         return np.float32(1.0 - share) * one + np.float32(share) * other
 
-    profile, excess = mixed(low.profile, high.profile), np.array([low.excess, high.excess])
-    border, moment, corner = ((1.0 - share) * excess[0] + share * excess[1]).tolist()
-    values = mixed(low.values, high.values)
-    around = values[: low.corner.size].reshape(low.corner.shape) if values.size else mixed(low.corner, high.corner)
-    return EdgeTables(profile, around, low.first, (border, moment, corner), values)
+    border, moment, corner = ((1.0 - share) * a + share * b for a, b in zip(low.excess, high.excess, strict=True))
+    return EdgeTables(
+        mixed(low.profile, high.profile), mixed(low.corner, high.corner), low.first, (border, moment, corner)
+    )
 
 
 @lru_cache(maxsize=32)
@@ -300,10 +302,6 @@ def averaged(form: BladeForm, scale: float, spread: float, pixel: float = 0.0) -
 @lru_cache(maxsize=KEPT_AVERAGES)
 def _averaged(corner: Corner, spread: float, pixel: float) -> EdgeTables:
     """Average tables over a band and a pixel."""
-    if corner.scale != 0.0 and math.frexp(corner.scale)[0] != 0.5:
-        # two averages serve an octave
-        low, high, share = _octave(corner)
-        return _between(_averaged(low, spread, pixel), _averaged(high, spread, pixel), share)
     band = _band(corner, spread, 0.5 * math.ceil(2.0 * (REACH + 0.5 + 0.5 * pixel)))
     profile = _box_averaged(band.profile, pixel * PROFILE_SAMPLES)
     profile[0], profile[-1] = 1.0, 0.0
@@ -314,6 +312,10 @@ def _averaged(corner: Corner, spread: float, pixel: float) -> EdgeTables:
 @lru_cache(maxsize=KEPT_BANDS)
 def _band(corner: Corner, spread: float, margin: float) -> EdgeTables:
     """Average tables over a band with a symmetric weight in ln s."""
+    if (between := _octave(corner)) is not None:
+        # two averages serve an octave
+        low, high, share = between
+        return _between(_band(low, spread, margin), _band(high, spread, margin), share)
     base = edge_tables(corner, margin)
     if spread == 0.0:
         return replace(base, excess=_excess(corner, base))
