@@ -122,7 +122,10 @@ def watch(scenario: dict[str, Any] | str) -> dict[str, Any]:
     from flarewright.kernels.jit.roots import needed
     from flarewright.model import Project
     from flarewright.render import warmup
+    from flarewright.render.ghosts import traced_ghosts
 
+    # small pictures have no visible steps of lateral colour, which larger ones fill
+    traced_ghosts.BRIDGE_PX = 0.01
     seen: list[list[str]] = []
     warmup.needed = lambda traits: seen.append(sorted(traits)) or needed(traits)
     if scenario == "edit":
