@@ -221,8 +221,8 @@ def test_a_command_plans_every_root_that_it_calls(size, tmp_path, request):
     else:
         done = watched(*words, cores=2, cache=tmp_path / "cache")
     assert "seen_rays" in done.called
-    # the light is outside the picture, so the core of its starburst is not drawn; small pictures have no colour steps to
-    # fill (a process that compiles its own plan counts as calling all of it)
+    # the light is outside the picture, so the core of its starburst is not drawn; in small pictures no colour steps are
+    # filled (a process that compiles its own plan counts as calling all of it)
     assert done.planned - done.called == ({"deposit_core", "rays_between"} if size == "64x36" else set())
     assert done.called <= done.planned
 
