@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from importlib import import_module
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -226,30 +227,32 @@ def test_ending_early_takes_seconds_and_keeps_what_is_stored(problem, tmp_path, 
     )  # fmt: skip
     assert 0 < ended.state.searches < 10**6
     assert minima(ended.state)
-    # on a cluster any two of the three come first
-    kept = {path.name for path in states.iterdir()}
-    assert len(kept) == 2
-    assert kept < {"0001.json", "0002.json", "0003.json"}
+    kept = sorted(path.name for path in states.iterdir())
+    # on a cluster the scheduler chooses which two of the three come first
+    firsts = list(combinations(("0001.json", "0002.json", "0003.json"), 2))
+    assert tuple(kept) in (firsts if cluster else firsts[:1])
 
 
 @pytest.mark.slow
 def test_a_worker_killed_in_the_middle_loses_no_restart(problem, whole, tmp_path, monkeypatch):
     pytest.importorskip("distributed", reason="needs the extra cluster")
     monkeypatch.setattr(module, "_STORE_S", 0.3)
-    killed = []
+    killed, said = [], []
 
     def kill_one(state):
         if not killed and state.searches > 0:
             killed.append(worker())
             os.kill(killed[0], signal.SIGKILL)
+            # it has ended when the workers are looked at next, and is not yet forgotten
+            os.waitid(os.P_PID, killed[0], os.WEXITED | os.WNOWAIT)
 
     ended = search_restarts(
-        chosen("pools"), problem, PoolState(5, restarts=3), Sharing(tmp_path, None, "local:2"),
+        chosen("pools"), problem, PoolState(5, restarts=3), Sharing(tmp_path, None, "local:2", said.append),
         limits=Limits(None, MORE, kill_one),
     )  # fmt: skip
-    # the other worker may be done before the end of this one is announced
     assert len(killed) == 1
     assert minima(ended.state) == minima(whole)
+    assert any("ended by signal 9; another one takes its place" in line for line in said)
 
 
 def worker():

@@ -99,9 +99,10 @@ class Cluster:
                 future.add_done_callback(answers.put)
 
         def look() -> None:
-            connection.watch()
+            # first what may end this: no lost worker is then replaced for nothing
             if watch is not None:
                 watch()
+            connection.watch()
 
         ahead = max(_AHEAD, _AHEAD_OF_WORKER * max(processes, self.workers))
         submit(ahead)
