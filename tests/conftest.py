@@ -133,3 +133,13 @@ def _one_tree_of_commands():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(typer.main, "get_command", cache(typer.main.get_command))
         yield
+
+
+@pytest.fixture
+def default_signals(monkeypatch):
+    """Give the signals that end a command their default handlers during a test; none has been received."""
+    monkeypatch.setattr("flarewright.cli.common._received", [])
+    before = [(one, signal.signal(one, signal.SIG_DFL)) for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
+    yield
+    for one, handler in before:
+        signal.signal(one, handler)

@@ -342,21 +342,14 @@ def test_signals_that_end_a_search(name):
     assert signal.getsignal(kind) is before
 
 
-def test_signals_that_end_a_command(monkeypatch):
-    monkeypatch.setattr("flarewright.cli.common._received", [])
-    kinds = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = [signal.signal(one, signal.SIG_DFL) for one in kinds]
-    try:
-        # as under nohup
-        signal.signal(signal.SIGHUP, signal.SIG_IGN)
-        end_as_interrupted()
-        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGTERM)
-        assert was_interrupted()
-    finally:
-        for one, handler in zip(kinds, before, strict=True):
-            signal.signal(one, handler)
+def test_signals_that_end_a_command(default_signals):
+    # as under nohup
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    end_as_interrupted()
+    assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGTERM)
+    assert was_interrupted()
 
 
 def test_a_checkpoint_that_cannot_be_written_is_reported_once(monkeypatch, capsys):

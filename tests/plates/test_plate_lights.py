@@ -168,7 +168,7 @@ def test_joined_lights_have_ghosts_and_no_image(lens):
 
 
 def test_two_thousand_sources_keep_their_light_when_they_are_joined():
-    """`python -m benchmarks --only shots` tells what they cost."""
+    """`python -m benchmarks --only shots` measures what they cost."""
     size, rng = (480, 270), np.random.default_rng(8)
     pixels = np.zeros((*size[::-1], 3), np.float32)
     places = rng.permutation(89 * 159)[:2000]
