@@ -44,6 +44,8 @@ COATINGS = {"bare": Everywhere(coating=Bare()), "coated": Everywhere(coating=Qua
 
 # halvings of cells that rays end in at different surfaces, and of all others
 ENDS, LEVELS = 3, 12
+# columns and rows of a cell's quarters
+QUARTERS = np.array([(0, 0), (0, 1), (1, 0), (1, 1)])
 # cells along the entrance, half as many across its half; the border is halved until its cells hold this part of the
 # light, full cells until this many rays pass: at first, and where the first search finds a difference
 FIRST, SECOND = (64, 0.1, 800), (128, 0.03, 4000)
@@ -120,51 +122,52 @@ def dense_search(
     made: Setup, path: LightPath, effort: tuple[int, float, int] = SECOND, least: float = 0.0
 ) -> Found | None:
     """Search the whole entrance for a path's light; None when no ray passes, or much less than `least` mm^2."""
-    packed, tilt = made.packed, made.light.tilt
-    rng, (ny, most_border, least_rays) = np.random.default_rng(path.mirrors), effort
-    x0, x1, y0, y1 = front_box(packed, tilt)
-    origin = np.array([x0, y0])
-    nx = ny // packed.halves
-    size = np.array([(x1 - x0) / nx, (y1 - y0) / ny])
-    corners = np.stack(np.meshgrid(x0 + size[0] * np.arange(nx), y0 + size[1] * np.arange(ny), indexing="ij"), axis=2)
-    todo, spent = corners.reshape(-1, 2), 0
-    full: list[Floats] = []
+    packed, rng, (ny, most_border, least_rays) = made.packed, np.random.default_rng(path.mirrors), effort
+    x0, x1, y0, y1 = front_box(packed, made.light.tilt)
+    grid = np.array([ny // packed.halves, ny])
+    origin, size = np.array([x0, y0]), np.array([x1 - x0, y1 - y0]) / grid
+    cells = np.stack(np.meshgrid(np.arange(grid[0]), np.arange(grid[1]), indexing="ij"), axis=2).reshape(-1, 2)
+    spent = 0
+    full: list[tuple[Floats, Floats]] = []
+    settled: list[Indices] = []
     for level in range(LEVELS + 1):
-        # four rays in the four quarters of every cell
-        quarter = np.array([(0.0, 0.0), (0.0, 0.5), (0.5, 0.0), (0.5, 0.5)])
-        places = todo[:, None] + size * (quarter + 0.5 * rng.random((len(todo), 4, 2)))
-        rays = trace_points(packed, 0, path, tilt, places.reshape(-1, 2))
-        spent += len(rays)
-        passing = _passing(packed, path, rays)
-        light = np.where(passing, rays[:, WEIGHT], 0.0) * size.prod() / 4.0
-        record = np.column_stack([places.reshape(-1, 2), light, rays[:, X], rays[:, Y]]).reshape(-1, 4, 5)
-        count = passing.reshape(-1, 4).sum(axis=1)
-        near = (count > 0) | _may_pass(packed, path, rays, level)
+        record, far = _four_rays(made, path, rng, origin, size, cells)
+        # an arc of light may continue where no ray of a coarser cell has met it
+        more = _unsearched(cells, record, settled, grid)
+        while len(more) and spent + 4 * (len(cells) + len(more)) < MOST:
+            cells = np.concatenate([cells, more])
+            record, far = (
+                np.concatenate(pair)
+                for pair in zip((record, far), _four_rays(made, path, rng, origin, size, more), strict=True)
+            )
+            more = _unsearched(cells, record, settled, grid)
+        spent += 4 * len(cells)
+        count = (record[:, :, 2] > 0.0).sum(axis=1)
+        near = (count > 0) | _may_pass(far, level)
         # light that enters a cell's corner may miss its four rays
-        near |= _beside(np.round((todo - origin) / size).astype(np.int64), count > 0)
+        near |= _beside(cells, count > 0)
         border = near & (count < 4)
         whole = count == 4
         held = sum(float(part[:, :, 2].sum()) for part, _ in full)
-        here = float(light.sum())
+        here = float(record[:, :, 2].sum())
         inside = sum(len(part) for part, _ in full) * 4 + 4 * int(whole.sum())
         if here + held <= 0.0 and not near.any():
             return None
         # cells in which all rays pass need no halving, unless there are few
-        settled = whole & (inside >= least_rays)
-        full.append((record[settled], np.column_stack([todo, np.broadcast_to(size, todo.shape)])[settled]))
-        on_border = float(light.reshape(-1, 4).sum(axis=1)[border].sum())
-        again = (whole & ~settled) | border
-        enough = here + held > 0.0 and on_border < most_border * (here + held) and not (whole & ~settled).any()
-        lost = level > ENDS + 1
+        done = whole & (inside >= least_rays)
+        again = (whole & ~done) | border
+        on_border = float(record[border, :, 2].sum())
+        enough = here + held > 0.0 and on_border < most_border * (here + held) and not (whole & ~done).any()
         if level == EARLY and packed.halves * (here + held) * GROWTH < least:
             return None
-        if (enough and lost) or level == LEVELS or spent + 16 * int(again.sum()) > MOST:
-            full.append((record[again], np.column_stack([todo, np.broadcast_to(size, todo.shape)])[again]))
+        last = (enough and level > ENDS + 1) or level == LEVELS or spent + 16 * int(again.sum()) > MOST
+        kept = done | again if last else done
+        full.append((record[kept], np.column_stack([origin + size * cells, np.broadcast_to(size, cells.shape)])[kept]))
+        if last or not again.any():
             break
-        todo = (todo[again][:, None] + 0.5 * size * 2.0 * quarter).reshape(-1, 2)
-        size = 0.5 * size
-        if not len(todo):
-            break
+        settled.append(cells[done])
+        cells = (2 * cells[again][:, None] + QUARTERS).reshape(-1, 2)
+        size, grid = 0.5 * size, 2 * grid
     rays = np.concatenate([part.reshape(-1, 5) for part, _ in full])
     rays = rays[rays[:, 2] > 0.0]
     if not len(rays):
@@ -177,37 +180,63 @@ def dense_search(
     return Found(flux * made.light.cosine, rms, rays[:, :3], np.concatenate([cells for _, cells in full]))
 
 
-def _measures(packed: PackedLens, path: LightPath, rays: Floats) -> Floats:
-    """Return how far out each ray comes: the largest r / semi-diameter, of rims and stop; inf for rays that end."""
-    out = rays[:, REL].copy()
+def _four_rays(
+    made: Setup, path: LightPath, rng: np.random.Generator, origin: Floats, size: Floats, cells: Indices
+) -> tuple[Floats, Floats]:
+    """Trace a random ray in each quarter of cells, given by columns and rows, shape (N, 2).
+
+    Returns the rays' places in the pupil, light, and places on the sensor, shape (N, 4, 5); and how far out they come:
+    the largest r / semi-diameter of rims and stop, and the surface where they end, -1 for none, shape (N, 4, 2).
+    """
+    packed = made.packed
+    places = (origin + size * (cells[:, None] + 0.5 * (QUARTERS + rng.random((len(cells), 4, 2))))).reshape(-1, 2)
+    rays = trace_points(packed, 0, path, made.light.tilt, places)
+    far = rays[:, REL].copy()
     for crossing in range(path.stop_crossings):
         at = STOP_X + 2 * crossing
-        out = np.maximum(out, np.hypot(rays[:, at], rays[:, at + 1]) / packed.stop_semi)
-    return np.where(rays[:, ALIVE] > 0.0, out, np.inf)
+        far = np.maximum(far, np.hypot(rays[:, at], rays[:, at + 1]) / packed.stop_semi)
+    alive = rays[:, ALIVE] > 0.0
+    light = np.where(alive & (far <= 1.0), rays[:, WEIGHT], 0.0) * size.prod() / 4.0
+    record = np.column_stack([places, light, rays[:, X], rays[:, Y]])
+    outside = np.column_stack([np.where(alive, far, np.inf), np.where(alive, -1.0, rays[:, X])])
+    return record.reshape(-1, 4, 5), outside.reshape(-1, 4, 2)
 
 
-def _passing(packed: PackedLens, path: LightPath, rays: Floats) -> Mask:
-    return np.asarray(_measures(packed, path, rays) <= 1.0)
-
-
-def _may_pass(packed: PackedLens, path: LightPath, rays: Floats, level: int) -> Mask:
-    """Return which cells of four rays may pass light although all four rays fail."""
-    far = _measures(packed, path, rays).reshape(-1, 4)
+def _may_pass(rays: Floats, level: int) -> Mask:
+    """Return which cells may pass light although all four rays fail; `rays` as `far` of `_four_rays`."""
+    far, ends = rays[:, :, 0], rays[:, :, 1]
     alive = np.isfinite(far)
     least, most = far.min(axis=1), np.where(alive, far, 0.0).max(axis=1)
     some, every = alive.any(axis=1), alive.all(axis=1)
     with np.errstate(invalid="ignore"):
         close = every & (least - 1.5 * (most - least) <= 1.0)
-    ends = rays[:, X].reshape(-1, 4)
     ended = ~some & (ends.min(axis=1) < ends.max(axis=1)) & (level < ENDS)
     return np.asarray(close | (some & ~every & (least < (3.0 if level < ENDS else 1.5))) | ended)
 
 
-def _beside(cells: Indices, lit: Mask) -> Mask:
-    """Return which cells touch a lit one; `cells` are columns and rows, shape (N, 2)."""
+def _keys(cells: Indices) -> Indices:
+    """Return a number for each cell, given by columns and rows, shape (N, 2)."""
+    return np.asarray(cells[:, 0] * 2**24 + cells[:, 1])
+
+
+def _around(cells: Indices) -> Indices:
+    """Return cells and their eight neighbours, some of them repeatedly."""
     shifts = np.array([(a, b) for a in (-1, 0, 1) for b in (-1, 0, 1)])
-    around = (cells[lit][:, None] + shifts).reshape(-1, 2)
-    return np.isin(cells[:, 0] * 2**24 + cells[:, 1], around[:, 0] * 2**24 + around[:, 1])
+    return np.asarray((cells[:, None] + shifts).reshape(-1, 2))
+
+
+def _beside(cells: Indices, lit: Mask) -> Mask:
+    """Return which cells touch a lit one."""
+    return np.isin(_keys(cells), _keys(_around(cells[lit])))
+
+
+def _unsearched(cells: Indices, record: Floats, settled: Sequence[Indices], grid: Indices) -> Indices:
+    """Return the neighbours of lit cells that are not searched; `settled` holds the full cells of coarser levels."""
+    around = np.unique(_around(cells[(record[:, :, 2] > 0.0).any(axis=1)]), axis=0)
+    known = np.isin(_keys(around), _keys(cells)) | (around < 0).any(axis=1) | (around >= grid).any(axis=1)
+    for k, full in enumerate(settled):
+        known |= np.isin(_keys(around >> (len(settled) - k)), _keys(full))
+    return np.asarray(around[~known])
 
 
 def covered(bundle: Bundle, places: Floats) -> Mask:
