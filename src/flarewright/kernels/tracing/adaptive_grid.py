@@ -26,6 +26,10 @@ SLIVER_LEVEL = 3
 # a rejected cell is halved if its least r / semi-diameter is below this, because a narrow horn may pass between two
 # rims: CLOSE for coarsest cells, CLOSE_BESIDE_ENDED for cells below SLIVER_LEVEL in which some rays end
 CLOSE, CLOSE_BESIDE_ENDED = 1.05, 1.25
+# where the light is a small part of the box, so that the flux tolerance is below NARROW, a cell whose rays all lie
+# beyond a rim is halved if r / semi-diameter bends between them by more than KINK of its variation: two rims that leave
+# a gap between the rays bend it by up to half of the variation, the curvature of one rim by a few hundredths
+NARROW, KINK = 5e-5, 0.1
 # a cell of at least level FAR_LEVEL is left out if at least FAR_RAYS of its nine rays land beyond FAR_RADII times the
 # picture's radius and the others end
 FAR_RAYS, FAR_RADII, FAR_LEVEL = 3, 2.0, 2
@@ -46,7 +50,10 @@ def _classify(data, nodes, crossings, iris, level, h, limits, values):
         doubtful = level < SLIVER_LEVEL + limits.slivers and _ends_differ(data, nodes, limits.slivers)
         if doubtful:
             return _split(ALL_END)
-        return _split(NEAR_RIM) if _may_hide_horn(data, nodes, level) else EMPTY
+        if _may_hide_horn(data, nodes, level):
+            return _split(NEAR_RIM)
+        narrow = level < limits.max_level and limits.flux_tolerance < NARROW
+        return _split(NEAR_RIM) if narrow and _may_hide_gap(data, nodes, values) else EMPTY
     if level >= limits.max_level:
         return LEAF
     x_low, x_high, y_low, y_high = np.inf, -np.inf, np.inf, -np.inf
@@ -66,6 +73,8 @@ def _classify(data, nodes, crossings, iris, level, h, limits, values):
         return EMPTY if alive >= FAR_RAYS and level >= FAR_LEVEL and out2 > far * far else _split(SOME_END)
     if out2 > view_radius * view_radius:
         return FLAT
+    if limits.flux_tolerance < NARROW and _may_hide_gap(data, nodes, values):
+        return _split(NEAR_RIM)
     extent = max(x_high - x_low, y_high - y_low) * scale
     error, reason = 0.0, RIM_BEND
     at_rim, at_fringes = False, False
@@ -165,6 +174,22 @@ def _may_hide_horn(data, nodes, level):
     if level < SLIVER_LEVEL and alive < nodes.size and low < CLOSE_BESIDE_ENDED:
         return True
     return level == 0 and 1.0 < low < CLOSE
+
+
+@borrowing
+def _may_hide_gap(data, nodes, values):
+    """Return whether all rays of a cell lie beyond a rim and a gap between two rims may pass light between them.
+
+    Notes
+    -----
+    On a line across a gap between two rims r / semi-diameter falls and rises again. If it does so equally fast, its
+    least value is below that of three equidistant rays by their bend at most.
+    """
+    for k in nodes:
+        if data[k, ALIVE] == 0.0 or data[k, REL] <= 1.0:
+            return False
+    low, high, bend = _limit_range(data, nodes, np.int64(0), 1.0, values)
+    return bend > KINK * (high - low) and low - bend <= 1.0
 
 
 @borrowing

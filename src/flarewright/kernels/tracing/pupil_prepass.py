@@ -18,14 +18,16 @@ PROBES = 8
 LATE_CELLS = 32
 # number of halvings of the gap between two rays if one of them ends, or if both end at different surfaces
 HALVINGS = 5
+# largest r / semi-diameter of a ray that passes: the box around the front touches its rim, and so may a sample
+RIM = 1.0 + 1e-6
 # where many cells pass, a gap is searched only if one of its rays has a largest r / semi-diameter of at most this
 NEAR = 2.0
 
 
 @borrowing
 def _outside(value_low, value_high, slack):
-    """Return whether a quantity stays above 1 between samples, with a margin of `slack` times its range."""
-    return value_low - slack * (value_high - value_low) > 1.0
+    """Return whether a quantity stays above RIM between samples, with a margin of `slack` times its range."""
+    return value_low - slack * (value_high - value_low) > RIM
 
 
 @borrowing
@@ -268,7 +270,7 @@ def _is_doubtful_cell(data, nodes, nx, ny, crossings, iris_radius, late):
 @borrowing
 def _passes(data, k, crossings, iris_radius):
     """Return whether a ray passes every rim, and the circle around the iris at each crossing."""
-    if data[k, ALIVE] == 0.0 or data[k, REL] > 1.0:
+    if data[k, ALIVE] == 0.0 or data[k, REL] > RIM:
         return False
     for c in range(crossings):
         u, v = data[k, STOP_X + 2 * c], data[k, STOP_X + 2 * c + 1]
