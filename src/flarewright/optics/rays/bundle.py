@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan, atan2, cos, hypot, radians, sin, sqrt, tan
+from math import atan, atan2, ceil, cos, hypot, radians, sin, sqrt, tan
 
 import numpy as np
 
 from ...kernels.tracing.adaptive_grid import build_mesh
 from ...kernels.tracing.grid_limits import GridLimits
-from ...kernels.tracing.sequential import STOP_X, trace_nodes
-from ...typing import Floats, Indices
+from ...kernels.tracing.sequential import ALIVE, REL, STOP_X, X, Y, trace_nodes
+from ...typing import Floats, Indices, Mask
 from ..lens.paths import LightPath
 from .pack import PackedLens, wavelengths_fitted
-from .pupil_region import Region, cells_across, tracing_arguments
+from .pupil_region import Region, cells_across, front_box, tracing_arguments, widened_box
 
 # coarsest cells of a bundle's grid over half its region, and limit of halvings per cell; a whole region has twice as
 # many cells across
@@ -25,6 +25,9 @@ MAX_LEVEL = 6
 RIM_LEVEL = 2
 # largest relative flux error from the rim
 FLUX_TOLERANCE = 3e-4
+# a region of which less than ARC is lit is widened by WIDER of its size where light comes to its side, at most
+# MOST_WIDENED times
+ARC, WIDER, MOST_WIDENED = 0.25, 0.25, 4
 # limits of a cell's smoothness (`kernels.tracing.grid_limits`)
 INNER_BEND, AREA_RATIO, WEIGHT_BEND, FOLD_PX, AREA_PX = 0.005, 0.5, 0.002, 1.0, 5.0
 
@@ -202,20 +205,61 @@ def trace_grid(
     Returns
     -------
     Bundle
+
+    Notes
+    -----
+    The pre-pass may lose the narrow end of an arc. The grid is finer than its samples: where a node on a side of the
+    region passes, the region is widened there, and the grid built again.
     """
     fitted = sorted(wavelengths_fitted(packed)[: 1 if fine.one_color else None])
     # errors accumulate along the rim of the light, which can be a small part of the box
     rim_tolerance = fine.flux_tolerance * 2.0**fine.rough * sqrt(region.share)
     rim_level = 0 if fine.coarse else RIM_LEVEL - 1 if fine.rough else RIM_LEVEL
-    cells = cells_across(packed, COARSE_GRID if fine.coarse else GRID)
     limits = GridLimits(
         rim_level, MAX_LEVEL, fine.tolerance, rim_tolerance, fine.fringe_px, fine.faint_radius, fine.scale,
         fine.view_radius, int(region.slivers), INNER_BEND, AREA_RATIO, WEIGHT_BEND, FOLD_PX, AREA_PX,
     )  # fmt: skip
-    pupil, data, triangles, halved = build_mesh(
-        *tracing_arguments(packed, fitted, path, tilt), path.stop_crossings, iris, region.box, cells, limits
-    )
+    arguments = tracing_arguments(packed, fitted, path, tilt)
+    box, cells = region.box, cells_across(packed, COARSE_GRID if fine.coarse else GRID)
+    may_widen = 0 if fine.coarse or region.share > ARC else MOST_WIDENED
+    limit = (path.stop_crossings, min(iris[0], fine.faint_radius))
+    for widened in range(may_widen + 1):
+        pupil, data, triangles, halved = build_mesh(*arguments, path.stop_crossings, iris, box, cells, limits)
+        if widened == may_widen:
+            break
+        front = front_box(packed, tilt)
+        sides = _lit_sides(pupil, data, box, box != front, limit, fine.view_radius)
+        if not sides.any():
+            break
+        wide = np.where(sides, widened_box(box, front, WIDER), box)
+        # the cells keep about their size
+        parts = (wide[1::2] - wide[0::2]) / (box[1::2] - box[0::2])
+        box, cells = wide, (ceil(cells[0] * parts[0]), ceil(cells[1] * parts[1]))
     return Bundle(path, pupil, triangles, dict(zip(fitted, data, strict=True)), packed.halves, halved)
+
+
+def _lit_sides(
+    pupil: Floats, data: Floats, box: Floats, inner: Mask, stop: tuple[int, float], view_radius: float
+) -> Mask:
+    """Return on which `inner` sides of its box a grid has nodes that pass and land in the picture, shape (4,).
+
+    `stop` holds the number of crossings and the radius.
+    """
+    lit = np.zeros(4, dtype=np.bool_)
+    for side in np.flatnonzero(inner):
+        places = pupil[:, side // 2]
+        slack = 1e-9 * (box[side | 1] - box[side & 2])
+        nodes = np.flatnonzero(places >= box[side] - slack if side % 2 else places <= box[side] + slack)
+        rays = data[:, nodes]
+        passing = (rays[:, :, ALIVE] > 0.0) & (rays[:, :, REL] <= 1.0)
+        if not passing.any():
+            continue
+        rays = rays[passing]
+        seen = np.hypot(rays[:, X], rays[:, Y]) <= view_radius
+        for at in range(STOP_X, STOP_X + 2 * stop[0], 2):
+            seen &= np.hypot(rays[:, at], rays[:, at + 1]) <= stop[1]
+        lit[side] = seen.any()
+    return lit
 
 
 def trace_bundle(packed: PackedLens, w: int, bundle: Bundle, tilt: float) -> Floats:

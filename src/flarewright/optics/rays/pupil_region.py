@@ -258,7 +258,7 @@ def find_region(
             box, cells = found, (2 * cells[0], 2 * cells[1])
             halved += 1
         elif open_sides.any():
-            wide = np.where(open_sides, _widened(found, first), found)
+            wide = np.where(open_sides, widened_box(found, first, 1.0), found)
             # as dense as before: wider cells would lose the light at the sides again
             parts = (wide[1::2] - wide[0::2]) / (box[1::2] - box[0::2])
             box, cells = wide, (max(ceil(cells[0] * parts[0]), cells[0]), max(ceil(cells[1] * parts[1]), cells[1]))
@@ -373,12 +373,8 @@ def widened_region(packed: PackedLens, region: Region, tilt: float, part: float)
     Region
         With the same flux.
     """
-    box, front = region.box, front_box(packed, tilt)
-    more = part * (box[1::2] - box[0::2])
-    low, high = np.maximum(box[0::2] - more, front[0::2]), np.minimum(box[1::2] + more, front[1::2])
-    wide = np.array([low[0], high[0], low[1], high[1]])
-    share = region.share * float(np.prod(box[1::2] - box[0::2]) / np.prod(high - low))
-    return replace(region, box=wide, share=share)
+    wide = widened_box(region.box, front_box(packed, tilt), part)
+    return replace(region, box=wide, share=region.share * _area(region.box) / _area(wide))
 
 
 def join_boxes(a: Floats, b: Floats) -> Floats:
@@ -387,18 +383,19 @@ def join_boxes(a: Floats, b: Floats) -> Floats:
     return np.array([low[0], high[0], low[1], high[1]])
 
 
+def widened_box(box: Floats, front: Floats, part: float) -> Floats:
+    """Widen a box of the pupil on every side by a part of its size, within the front, each shape (4,)."""
+    wide, high = part * (box[1::2] - box[0::2])
+    grown = box + np.array([-wide, wide, -high, high])
+    return np.asarray(np.clip(grown, front[[0, 0, 2, 2]], front[[1, 1, 3, 3]]))
+
+
 def _around(found: Floats, box: Floats, cells: tuple[int, int]) -> Floats:
     """Widen a region to three times its size plus four cells of its scan, within the scan's box."""
     wide = max(found[1] - found[0], 4.0 * (box[1] - box[0]) / cells[0])
     high = max(found[3] - found[2], 4.0 * (box[3] - box[2]) / cells[1])
     grown = found + np.array([-wide, wide, -high, high])
     return np.array([max(grown[0], box[0]), min(grown[1], box[1]), max(grown[2], box[2]), min(grown[3], box[3])])
-
-
-def _widened(found: Floats, box: Floats) -> Floats:
-    """Widen a region by its size on every side, within a box."""
-    wide, high = found[1] - found[0], found[3] - found[2]
-    return np.asarray(np.clip(found + np.array([-wide, wide, -high, high]), box[[0, 0, 2, 2]], box[[1, 1, 3, 3]]))
 
 
 def _scan(
