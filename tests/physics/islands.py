@@ -133,14 +133,9 @@ def dense_search(
     for level in range(LEVELS + 1):
         record, far = _four_rays(made, path, rng, origin, size, cells)
         # an arc of light may continue where no ray of a coarser cell has met it
-        more = _unsearched(cells, record, settled, grid)
-        while len(more) and spent + 4 * (len(cells) + len(more)) < MOST:
-            cells = np.concatenate([cells, more])
-            record, far = (
-                np.concatenate(pair)
-                for pair in zip((record, far), _four_rays(made, path, rng, origin, size, more), strict=True)
-            )
-            more = _unsearched(cells, record, settled, grid)
+        while len(more := _unsearched(cells, record, settled, grid)) and spent + 4 * (len(cells) + len(more)) < MOST:
+            also, also_far = _four_rays(made, path, rng, origin, size, more)
+            cells, record, far = (np.concatenate(pair) for pair in ((cells, more), (record, also), (far, also_far)))
         spent += 4 * len(cells)
         count = (record[:, :, 2] > 0.0).sum(axis=1)
         near = (count > 0) | _may_pass(far, level)
@@ -161,8 +156,13 @@ def dense_search(
         if level == EARLY and packed.halves * (here + held) * GROWTH < least:
             return None
         last = (enough and level > ENDS + 1) or level == LEVELS or spent + 16 * int(again.sum()) > MOST
-        kept = done | again if last else done
-        full.append((record[kept], np.column_stack([origin + size * cells, np.broadcast_to(size, cells.shape)])[kept]))
+        if last:
+            done = done | again
+        else:
+            # the rays that chose full cells would overestimate them
+            record[done], _ = _four_rays(made, path, rng, origin, size, cells[done])
+            spent += 4 * int(done.sum())
+        full.append((record[done], np.column_stack([origin + size * cells, np.broadcast_to(size, cells.shape)])[done]))
         if last or not again.any():
             break
         settled.append(cells[done])
