@@ -37,6 +37,8 @@ from flarewright.render.scene.resolve import load_lens
 
 CORPUS = Path(__file__).parents[3] / "shared" / "lens_corpus"
 CASES = Path(os.environ.get("FLAREWRIGHT_CASES", Path(__file__).parents[3] / "shared" / "cases"))
+ASPHERES = CORPUS.with_name("zmx_corpus")
+ASPHERIC = "Canon_EF14mm_f2.8L_USM.zmx"
 KONICA = "Konica_Minolta_72-195mm_F2.88_IF_(Konica_Minolta_AF_70-200mm_F2.8_APO_G_D_SSM).lens"
 SIGMA = "Sigma_29-77mm_F3.61-5.87_(Sigma_28-80mm_F3.5-5.6_Aspherical_Macro_HF).lens"
 WIDE_CANON = "Canon_17-39mm_F4.1_(Canon_EF17-40mm_f4L_USM).lens"
@@ -122,6 +124,23 @@ def test_light_at_the_end_of_an_arc_is_found(file, angle, path, flux, rms):
     our_flux, our_rms, bundle = measured(made, ghost_path(made.lens, *path))
     assert our_flux == pytest.approx(flux, rel=FLUX)
     assert our_rms == pytest.approx(rms, rel=SIZE)
+    light = found.rays[:, 2]
+    assert light @ covered(bundle, found.rays[:, :2]) > 0.999 * light.sum()
+
+
+def test_a_ring_thinner_than_the_coarsest_cells_is_whole():
+    """4-2 of a 14 mm with aspheres: a disk, and a ring of a tenth of a millimetre; two coarse cells missed it.
+
+    The oracle has no aspheric terms; the dense search agrees with 6 million random rays in the ring's box within 0.2 %.
+    """
+    if not (ASPHERES / ASPHERIC).exists():
+        pytest.skip(f"{ASPHERES} is not there")
+    made = setup(load_lens(ASPHERES / ASPHERIC), (0.0, 8.678), COATINGS["bare"])
+    path = ghost_path(made.lens, 4, 2)
+    found = dense_search(made, path, SECOND)
+    flux, rms, bundle = measured(made, path)
+    assert flux == pytest.approx(found.flux, rel=FLUX)
+    assert rms == pytest.approx(found.rms, rel=SIZE)
     light = found.rays[:, 2]
     assert light @ covered(bundle, found.rays[:, :2]) > 0.999 * light.sum()
 

@@ -26,10 +26,11 @@ SLIVER_LEVEL = 3
 # a rejected cell is halved if its least r / semi-diameter is below this, because a narrow horn may pass between two
 # rims: CLOSE for coarsest cells, CLOSE_BESIDE_ENDED for cells below SLIVER_LEVEL in which some rays end
 CLOSE, CLOSE_BESIDE_ENDED = 1.05, 1.25
-# where the light is a small part of the box, so that the flux tolerance is below NARROW, a cell whose rays all lie
+# light is narrow if it passes beside rays that end, or is so small a part of the box that the flux tolerance is below
+# NARROW. Then a coarsest cell is halved if some of its rays end and the others do not pass. A cell whose rays all lie
 # beyond a rim is halved if r / semi-diameter bends between them by more than KINK of its variation: two rims that leave
 # a gap between the rays bend it by up to half of the variation, the curvature of one rim by a few hundredths
-NARROW, KINK = 5e-5, 0.1
+NARROW, KINK = 6e-5, 0.2
 # a cell of at least level FAR_LEVEL is left out if at least FAR_RAYS of its nine rays land beyond FAR_RADII times the
 # picture's radius and the others end
 FAR_RAYS, FAR_RADII, FAR_LEVEL = 3, 2.0, 2
@@ -45,15 +46,16 @@ def _classify(data, nodes, crossings, iris, level, h, limits, values):
     tolerance, fringe_tolerance, scale, view_radius = (
         limits.tolerance, limits.fringe_tolerance, limits.scale, limits.view_radius
     )  # fmt: skip
+    narrow = limits.slivers > 0 or limits.flux_tolerance < NARROW
     if rejected(data, nodes, crossings, iris_radius, 0.25):
         # a sliver may pass between rays that end at different surfaces
-        doubtful = level < SLIVER_LEVEL + limits.slivers and _ends_differ(data, nodes, limits.slivers)
-        if doubtful:
+        beside = narrow and (level == 0 or limits.slivers > 0)
+        if level < SLIVER_LEVEL + limits.slivers and _ends_differ(data, nodes, beside):
             return _split(ALL_END)
         if _may_hide_horn(data, nodes, level):
             return _split(NEAR_RIM)
-        narrow = level < limits.max_level and limits.flux_tolerance < NARROW
-        return _split(NEAR_RIM) if narrow and _may_hide_gap(data, nodes, values) else EMPTY
+        gap = narrow and level < limits.max_level and _may_hide_gap(data, nodes, values)
+        return _split(NEAR_RIM) if gap else EMPTY
     if level >= limits.max_level:
         return LEAF
     x_low, x_high, y_low, y_high = np.inf, -np.inf, np.inf, -np.inf
@@ -73,7 +75,7 @@ def _classify(data, nodes, crossings, iris, level, h, limits, values):
         return EMPTY if alive >= FAR_RAYS and level >= FAR_LEVEL and out2 > far * far else _split(SOME_END)
     if out2 > view_radius * view_radius:
         return FLAT
-    if limits.flux_tolerance < NARROW and _may_hide_gap(data, nodes, values):
+    if narrow and _may_hide_gap(data, nodes, values):
         return _split(NEAR_RIM)
     extent = max(x_high - x_low, y_high - y_low) * scale
     error, reason = 0.0, RIM_BEND
@@ -149,15 +151,15 @@ def _thin(data, nodes, width):
 
 
 @borrowing
-def _ends_differ(data, nodes, slivers):
-    """Return whether all rays of a cell end, at different surfaces; with slivers also whether some of them end."""
+def _ends_differ(data, nodes, beside):
+    """Return whether all rays of a cell end, at different surfaces; with `beside` also whether some of them end."""
     low, high, alive = np.inf, -np.inf, 0
     for k in nodes:
         if data[k, ALIVE] > 0.0:
             alive += 1
         else:
             low, high = min(low, data[k, X]), max(high, data[k, X])
-    return low < high if alive == 0 else slivers > 0 and alive < nodes.size
+    return low < high if alive == 0 else beside and alive < nodes.size
 
 
 @borrowing

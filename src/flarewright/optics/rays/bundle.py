@@ -21,6 +21,8 @@ GRID = (4, 8)
 # the same for a ghost of a screen preview
 COARSE_GRID = (3, 6)
 MAX_LEVEL = 6
+# one halving more in a region of which less than this part is lit, in full detail
+NARROW = 0.04
 # least number of halvings of cells that the rim crosses, one less where the rim may be rough
 RIM_LEVEL = 2
 # largest relative flux error from the rim
@@ -215,8 +217,9 @@ def trace_grid(
     # errors accumulate along the rim of the light, which can be a small part of the box
     rim_tolerance = fine.flux_tolerance * 2.0**fine.rough * sqrt(region.share)
     rim_level = 0 if fine.coarse else RIM_LEVEL - 1 if fine.rough else RIM_LEVEL
+    max_level = MAX_LEVEL + int(region.share < NARROW and not (region.slivers or fine.rough or fine.coarse))
     limits = GridLimits(
-        rim_level, MAX_LEVEL, fine.tolerance, rim_tolerance, fine.fringe_px, fine.faint_radius, fine.scale,
+        rim_level, max_level, fine.tolerance, rim_tolerance, fine.fringe_px, fine.faint_radius, fine.scale,
         fine.view_radius, int(region.slivers), INNER_BEND, AREA_RATIO, WEIGHT_BEND, FOLD_PX, AREA_PX,
     )  # fmt: skip
     arguments = tracing_arguments(packed, fitted, path, tilt)
