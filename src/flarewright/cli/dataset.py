@@ -6,19 +6,22 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import ProjectError
 from .common import check_place, first_run_bar, print_json, print_remark, print_remarks, progress_bar
+from .option_record import with_options
 from .progress_lines import ProgressLines
 
 if TYPE_CHECKING:
     from ..model import Project
     from ..model.project.dataset import DatasetSpec
     from ..workflow.training_pairs.item import ItemResult
+    from ..workflow.training_pairs.run import DatasetResult
 
 EPILOG = (
     "Examples:\n\nflarewright dataset --example > pairs.toml\n\n"
@@ -29,103 +32,75 @@ EPILOG = (
 _PREVIEWED, _MOST_PREVIEWED = 8, 64
 
 
-def dataset(
-    spec: Annotated[Path | None, typer.Argument(metavar="SPEC.toml", help="The distributions to draw from.")] = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder of the data set.")
-    ] = None,
+@dataclass(frozen=True, kw_only=True)
+class DatasetOptions:
+    """Options of `flarewright dataset`. None: not given."""
+
+    spec: Annotated[Path | None, typer.Argument(metavar="SPEC.toml", help="The distributions to draw from.")] = None
+    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder of the data set.")] = None
     items: Annotated[
         int | None, typer.Option("-n", "--items", min=1, help="Number of items (default: 100; of a preview 8).")
-    ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed (default: that of the specification).")] = None,
+    ] = None
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed (default: that of the specification).")] = None
     preview: Annotated[
         Path | None,
         typer.Option(metavar="SHEET.png", help="Write a contact sheet of the first items instead of a data set."),
-    ] = None,
-    example: Annotated[bool, typer.Option("--example", help="Print a specification to start from, and exit.")] = False,
-    processes: Annotated[int | None, typer.Option(min=1, help="Number of processes (default: one per core).")] = None,
+    ] = None
+    example: Annotated[bool, typer.Option("--example", help="Print a specification to start from, and exit.")] = False
+    processes: Annotated[int | None, typer.Option(min=1, help="Number of processes (default: one per core).")] = None
     threads: Annotated[
         int | None, typer.Option(min=1, help="Threads of all processes together (default: one per core).")
-    ] = None,
+    ] = None
     chunk: Annotated[
         str | None, typer.Option(metavar="I/N", help="Draw part I of N of the items, for render farms.")
-    ] = None,
+    ] = None
     cluster: Annotated[
         str | None,
         typer.Option(metavar="WHERE", help="Draw on a Dask cluster: local:N, tcp://HOST:PORT or slurm:FILE."),
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print a summary as one JSON object.")] = False,
-) -> None:
+    ] = None
+    as_json: Annotated[bool, typer.Option("--json", help="Print a summary as one JSON object.")] = False
+
+
+@with_options(DatasetOptions)
+def dataset(options: DatasetOptions) -> None:
     """Draw training pairs for the removal and the detection of lens flare, from distributions in a file.
 
     Finished items are kept: the same command resumes, and a larger -n adds items. On a terminal a bar shows the
     progress; elsewhere stderr gets one line of JSON for each item.
     """
-    if example:
-        others: dict[str, object] = {"SPEC.toml": spec, "-o": output, "-n": items, "--seed": seed, "--preview": preview}
-        others |= {"--processes": processes, "--threads": threads, "--chunk": chunk, "--cluster": cluster}
-        others |= {"--json": as_json or None}
-        _print_example(others)
+    if options.example:
+        _print_example(options)
         return
-    if spec is None:
+    if options.spec is None:
         raise ProjectError("a specification is missing; flarewright dataset --example > pairs.toml writes one")
-    if (output is None) == (preview is None):
-        what = "--preview and -o are two outputs" if output else "there is no output"
+    if (options.output is None) == (options.preview is None):
+        what = "--preview and -o are two outputs" if options.output else "there is no output"
         raise ProjectError(f"{what}; give -o FOLDER for a data set, or --preview SHEET.png for a contact sheet")
-    settings = _settings(spec, seed)
-    started = time.monotonic()
-    if preview is not None:
-        others = {"--chunk": chunk, "--processes": processes, "--cluster": cluster}
-        if idle := [name for name, value in others.items() if value is not None]:
-            raise ProjectError(f"{idle[0]} has no effect on a contact sheet; leave it out")
-        _preview(settings, preview, spec, items, threads, as_json)
-        return
-    assert output is not None
-    from ..workflow.training_pairs.run import dataset as draw
-
-    with _progress() as report:
-        result = draw(
-            settings,
-            output,
-            items=100 if items is None else items,
-            chunk=chunk,
-            processes=processes,
-            threads=threads,
-            report=report,
-            prepare=_compile,
-            cluster=cluster,
-            announce=print_remark,
-        )
-    print_remarks(result.remarks)
-    seconds = time.monotonic() - started
-    if as_json:
-        print_json(
-            {
-                "folder": result.folder,
-                "items": result.items,
-                "drawn": result.drawn,
-                "kept": result.kept,
-                "splits": result.splits,
-                "lenses": result.lenses,
-                "complete": result.complete,
-                "processes": result.processes,
-                "seconds": round(seconds, 3),
-                "remarks": list(result.remarks),
-            }
-        )
-        return
-    words = [f"drew {result.drawn} items in {seconds:.1f} s"] if result.drawn else []
-    words += [f"kept {result.kept} that the same specification made"] if result.kept else []
-    words += [f"{number} {split}" for split, number in result.splits.items()]
-    print_remarks([f"{result.folder}: {', '.join(words) or 'no item was to be drawn'}"])
+    settings = _settings(options.spec, options.seed)
+    if options.preview is not None:
+        _preview(settings, options.preview, options.spec, options)
+    elif options.output is not None:
+        _draw(settings, options.output, options)
 
 
-def _print_example(others: dict[str, object]) -> None:
+def _print_example(options: DatasetOptions) -> None:
     from ..io.project.dataset_file import EXAMPLE
 
-    if idle := [name for name, value in others.items() if value is not None]:
-        raise ProjectError(f"--example only prints a specification; leave {idle[0]} out")
+    idle = _first_given(
+        {
+            "SPEC.toml": options.spec, "-o": options.output, "-n": options.items, "--seed": options.seed,
+            "--preview": options.preview, "--processes": options.processes, "--threads": options.threads,
+            "--chunk": options.chunk, "--cluster": options.cluster, "--json": options.as_json or None,
+        }
+    )  # fmt: skip
+    if idle is not None:
+        raise ProjectError(f"--example only prints a specification; leave {idle} out")
     sys.stdout.write(EXAMPLE)
+
+
+def _first_given(values: dict[str, object]) -> str | None:
+    """Return the first flag that has a value."""
+    return next((flag for flag, value in values.items() if value is not None), None)
 
 
 def _settings(path: Path, seed: int | None) -> DatasetSpec:
@@ -139,28 +114,67 @@ def _settings(path: Path, seed: int | None) -> DatasetSpec:
     return settings.replace(seed=seed)
 
 
-def _preview(
-    settings: DatasetSpec, preview: Path, spec: Path, items: int | None, threads: int | None, as_json: bool
-) -> None:
+def _draw(settings: DatasetSpec, output: Path, options: DatasetOptions) -> None:
+    """Draw the data set and print what became of it."""
+    from ..workflow.training_pairs.run import dataset as draw
+
+    started = time.monotonic()
+    with _progress() as report:
+        result = draw(
+            settings,
+            output,
+            items=100 if options.items is None else options.items,
+            chunk=options.chunk,
+            processes=options.processes,
+            threads=options.threads,
+            report=report,
+            prepare=_compile,
+            cluster=options.cluster,
+            announce=print_remark,
+        )
+    seconds = time.monotonic() - started
+    print_remarks(result.remarks)
+    if options.as_json:
+        print_json(_data(result, seconds))
+        return
+    words = [f"drew {result.drawn} items in {seconds:.1f} s"] if result.drawn else []
+    words += [f"kept {result.kept} that the same specification made"] if result.kept else []
+    words += [f"{number} {split}" for split, number in result.splits.items()]
+    print_remarks([f"{result.folder}: {', '.join(words) or 'no item was to be drawn'}"])
+
+
+def _data(result: DatasetResult, seconds: float) -> dict[str, Any]:
+    """Return the summary of `--json`."""
+    return {
+        "folder": result.folder, "items": result.items, "drawn": result.drawn, "kept": result.kept,
+        "splits": result.splits, "lenses": result.lenses, "complete": result.complete, "processes": result.processes,
+        "seconds": round(seconds, 3), "remarks": list(result.remarks),
+    }  # fmt: skip
+
+
+def _preview(settings: DatasetSpec, preview: Path, spec: Path, options: DatasetOptions) -> None:
     """Write a contact sheet."""
+    idle = _first_given({"--chunk": options.chunk, "--processes": options.processes, "--cluster": options.cluster})
+    if idle is not None:
+        raise ProjectError(f"{idle} has no effect on a contact sheet; leave it out")
     from ..io.images.png import write_png
     from ..workflow.training_pairs.draw import draw_item
     from ..workflow.training_pairs.preview import preview_picture
 
-    number = _PREVIEWED if items is None else items
+    number = _PREVIEWED if options.items is None else options.items
     if number > _MOST_PREVIEWED:
         raise ProjectError(f"a contact sheet has at most {_MOST_PREVIEWED} items; choose a smaller -n than {number}")
     check_place(preview, ".png")
     from ..kernels.jit.warmup_processes import cores
 
-    _compile(draw_item(settings, 0).project, threads or cores())
+    _compile(draw_item(settings, 0).project, options.threads or cores())
     with progress_bar() as begin:
         bar = begin("preview")
         sheet = preview_picture(
-            settings, number, threads=threads, report=lambda done, of: bar(done / of, f"item {done} of {of}")
+            settings, number, threads=options.threads, report=lambda done, of: bar(done / of, f"item {done} of {of}")
         )
     write_png(preview, sheet, {"Description": f"first {number} items of {spec.name}"})
-    if as_json:
+    if options.as_json:
         print_json({"preview": str(preview), "items": number})
     else:
         print_remarks([f"wrote {preview}"])
