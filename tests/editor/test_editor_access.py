@@ -330,13 +330,12 @@ def test_a_token_is_no_option(tmp_path, capsys):
 
 def test_an_address_that_can_be_opened_is_printed(monkeypatch, capsys):
     """0.0.0.0 is an address to listen on, not one that a browser can open."""
-    from flarewright.cli import edit
-    from flarewright.editor.server import app
+    from flarewright.editor.server import launch
 
-    monkeypatch.setattr(app, "serve", lambda workspace, access, port, ready: ready(8123))
+    monkeypatch.setattr(launch, "serve", lambda workspace, access, port, ready: ready(8123))
     monkeypatch.setenv(VARIABLE, "eight & more")
     for known, elsewhere in (("198.51.100.7", "198.51.100.7"), (None, "box")):
-        monkeypatch.setattr(edit, "_own_address", lambda beyond, known=known: known)
+        monkeypatch.setattr(launch, "_own_address", lambda beyond, known=known: known)
         monkeypatch.setattr("socket.gethostname", lambda: "box")
         assert run(["edit", "--no-browser", "--host", "0.0.0.0"]) == 0
         here, there, warning, *_ = capsys.readouterr().err.splitlines()
@@ -346,7 +345,7 @@ def test_an_address_that_can_be_opened_is_printed(monkeypatch, capsys):
     monkeypatch.delenv(VARIABLE)
     assert run(["edit", "--no-browser", "--port", "0"]) == 0
     assert f"http://127.0.0.1:8123/?token={token_of(None)}  (" in capsys.readouterr().err
-    assert edit.hosts("::")[0] == "::1"
+    assert launch.hosts("::")[0] == "::1"
 
 
 def test_requests_wait_in_a_bounded_queue_and_leave_it_with_their_client():

@@ -1,7 +1,8 @@
 """The web server of the editor.
 
-Public entry points: `app.serve`, `app.make_app`, `workspace.Workspace`.
+Public entry points: `launch.open_editor`, `app.serve`, `app.make_app`, `workspace.Workspace`.
 
+- `launch`: `open_editor` joins session, access and server
 - `app`: routes, request handlers, and `serve`
 - `workspace`: `Workspace` joins session, screen, solver and browser tabs
 - `access`: `Access`, and `Guard`, which checks origin and token of requests
