@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,6 +17,9 @@ from ..common import (
     print_json,
     print_remarks,
 )
+
+if TYPE_CHECKING:
+    from ...workflow.own_library.addition import Addition
 
 EPILOG = (
     "Examples:\n\nflarewright library add ~/lenses\n\nflarewright library add patents.zip\n\n"
@@ -53,49 +56,56 @@ def add(
             progress=bar,
         )  # fmt: skip
     if as_json:
-        from ...io.lens.own.record import as_json as record_json
-
-        print_json(
-            {
-                "added": [record_json(record) for record in found.added],
-                "known": [{"file": file, "name": there} for file, there in found.known],
-                "refused": [{"file": one.file, "reason": one.reason} for one in found.refused],
-                "other_files": found.others,
-                "remarks": found.remarks,
-            }
-        )
+        print_json(_data(found))
     else:
-        for record in found.added:
-            print(f"{record.name}: {record.title}, {record.file}")
-            for remark in record.remarks:
-                print(f"  - {remark}")
-        # a single one is the error below
-        alone = len(found.refused) == 1 and not found.added and not found.known
-        for one in () if alone else found.refused[:_LISTED]:
-            reason = one.reason if Path(one.file).name in one.reason else f"{one.file}: {one.reason}"
-            print(f"flarewright: refused: {reason}", file=sys.stderr)
-        if len(found.refused) > _LISTED:
-            more = len(found.refused) - _LISTED
-            print(f"flarewright: and {more} more refused files, which --json lists", file=sys.stderr)
-        print_remarks(found.remarks)
-        print_remarks([_summary(len(found.added), len(found.known), len(found.refused), found.others)])
+        _print(found)
     if not found.added and not found.known:
         if len(found.refused) == 1:
-            print(f"flarewright: error: {found.refused[0].reason}", file=sys.stderr)
+            why = found.refused[0].reason
         elif found.refused:
-            print("flarewright: error: none of the files is a usable lens", file=sys.stderr)
+            why = "none of the files is a usable lens"
         else:
-            print("flarewright: error: there are no lens files: check the folder", file=sys.stderr)
+            why = "there are no lens files: check the folder"
+        print(f"flarewright: error: {why}", file=sys.stderr)
         raise typer.Exit(2)
 
 
-def _summary(added: int, known: int, refused: int, others: dict[str, int]) -> str:
+def _data(found: Addition) -> dict[str, Any]:
+    """Return the JSON object of `--json`."""
+    from ...io.lens.own.record import as_json
+
+    return {
+        "added": [as_json(record) for record in found.added],
+        "known": [{"file": file, "name": there} for file, there in found.known],
+        "refused": [{"file": one.file, "reason": one.reason} for one in found.refused],
+        "other_files": found.others,
+        "remarks": found.remarks,
+    }
+
+
+def _print(found: Addition) -> None:
+    for record in found.added:
+        print(f"{record.name}: {record.title}, {record.file}")
+        for remark in record.remarks:
+            print(f"  - {remark}")
+    # the command's error names a single one
+    alone = len(found.refused) == 1 and not found.added and not found.known
+    for one in () if alone else found.refused[:_LISTED]:
+        reason = one.reason if Path(one.file).name in one.reason else f"{one.file}: {one.reason}"
+        print(f"flarewright: refused: {reason}", file=sys.stderr)
+    if len(found.refused) > _LISTED:
+        more = len(found.refused) - _LISTED
+        print(f"flarewright: and {more} more refused files, which --json lists", file=sys.stderr)
+    print_remarks([*found.remarks, _summary(found)])
+
+
+def _summary(found: Addition) -> str:
     from ...io.files.sentences import count
 
-    parts = [f"{count(added, 'lens', 'lenses')} added"]
-    parts += [f"{known} known already"] if known else []
-    parts += [f"{refused} refused"] if refused else []
-    if others:
-        kinds = ", ".join(f"{number} {suffix or 'without suffix'}" for suffix, number in list(others.items())[:8])
+    parts = [f"{count(len(found.added), 'lens', 'lenses')} added"]
+    parts += [f"{len(found.known)} known already"] if found.known else []
+    parts += [f"{len(found.refused)} refused"] if found.refused else []
+    if found.others:
+        kinds = ", ".join(f"{number} {suffix or 'without suffix'}" for suffix, number in list(found.others.items())[:8])
         parts.append(f"other files left out: {kinds}")
     return "; ".join(parts)

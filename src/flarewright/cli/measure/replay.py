@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ...errors import FlarewrightError
 from ..common import check_place, picture_size, print_json, print_remarks
+
+if TYPE_CHECKING:
+    from ...model.measurement.replay_camera import ReplayCamera
 
 EPILOG = "Example:\n\nflarewright measure replay model.json --constellation 12.3 --roll 30 -o flare.exr"
 
@@ -44,33 +47,41 @@ def replay(
     from ...io.images.half import half_scale
     from ...io.measurement.ghost_model_file import read_ghost_model, read_replay_camera
     from ...measure.replay.model_image import replay_model as draw
-    from ...measure.replay.placement import brightness_gain, constellation_and_roll
+    from ...measure.replay.placement import brightness_gain
     from ...model.measurement.replay_camera import ReplayCamera
 
     known = read_ghost_model(model)
     shot = ReplayCamera() if camera is None else read_replay_camera(camera)
-    if shot.light is not None:
-        if constellation is not None or roll is not None:
-            raise FlarewrightError("the camera file places the light; omit --constellation and --roll")
-        constellation, roll = constellation_and_roll(shot.position, shot.forward, shot.up, shot.light)
-    if constellation is None:
-        raise FlarewrightError("no place of the light; give --constellation DEG, or a --camera file with a light")
+    angle, turn = _place(shot, constellation, roll)
     pixels = picture_size(size) if size is not None else shot.size_px or known.size_px
     gain = brightness_gain(known.reference, shot)
-    layers = draw(known, constellation, roll_deg=roll or 0.0, size_px=pixels, gain=gain, single=single,
+    layers = draw(known, angle, roll_deg=turn, size_px=pixels, gain=gain, single=single,
                   colors="rec709" if rec709 else "camera")  # fmt: skip
-    metadata = {"model": model.name, "constellation_deg": f"{constellation:.9g}", "roll_deg": f"{roll or 0.0:.9g}"}
+    metadata = {"model": model.name, "constellation_deg": f"{angle:.9g}", "roll_deg": f"{turn:.9g}"}
     # the gain stands for the light's strength, as the intensity does in `render`
     scale = 1.0 if full else half_scale(gain)
     print_remarks(
         write_exr(output, layers, pixels, pixel_type="float" if full else "half", scale=scale, metadata=metadata)
     )
     facts = {
-        "output": str(output), "constellation_deg": constellation, "roll_deg": roll or 0.0, "brightness": gain,
+        "output": str(output), "constellation_deg": angle, "roll_deg": turn, "brightness": gain,
         "size_px": list(pixels), "layers": [layer.name for layer in layers], "scale": scale,
     }  # fmt: skip
     if as_json:
         print_json(facts)
     else:
-        place = f"{constellation:.4g} degrees, roll {roll or 0.0:.4g}"
+        place = f"{angle:.4g} degrees, roll {turn:.4g}"
         print(f"{output}: {count(len(layers), 'layer')}, {place}, brightness {gain:.4g}")
+
+
+def _place(camera: ReplayCamera, constellation_deg: float | None, roll_deg: float | None) -> tuple[float, float]:
+    """Return constellation and roll of the light, degrees: those of the camera file, or as given."""
+    from ...measure.replay.placement import constellation_and_roll
+
+    if camera.light is not None:
+        if constellation_deg is not None or roll_deg is not None:
+            raise FlarewrightError("the camera file places the light; omit --constellation and --roll")
+        constellation_deg, roll_deg = constellation_and_roll(camera.position, camera.forward, camera.up, camera.light)
+    elif constellation_deg is None:
+        raise FlarewrightError("no place of the light; give --constellation DEG, or a --camera file with a light")
+    return constellation_deg, roll_deg or 0.0

@@ -46,26 +46,15 @@ def render(options: RenderOptions) -> None:
     from ...render.image.ocio_space import check_file_space
 
     check_place(options.output, ".exr")
-    view_of = preview_look(
-        view=options.view,
-        exposure=options.exposure,
-        ev=options.ev,
-        shutter=options.shutter,
-        iso=options.iso,
-        lux=options.lux,
-        no_png=options.no_png,
-    )
+    view_of = preview_look(options)
     state = _read_state(options.resume)
     flags, settings, remarks = project_of_options(options, state)
     check_exposure(view_of, settings)
     remarks += check_file_space(settings)
     run = _reference_run(options, settings, state)
     kept = _kept_part(options, settings)
-    keep_inputs(
-        settings,
-        options.project,
-        [options.output] if options.no_png else [options.output, options.output.with_suffix(".png")],
-    )
+    pictures = [options.output] if options.no_png else [options.output, options.output.with_suffix(".png")]
+    keep_inputs(settings, options.project, pictures)
     from .art_flags import naming_rules
 
     try:
@@ -117,10 +106,7 @@ def project_of_options(
         Of a shot: its frames per second and the number of its frame at 0 s, where they are given. Lights of
         `--light-px` then stay at their pixels while the lens moves.
     """
-    if options.half and options.float32:
-        raise ProjectError("--half and --float both set the bits per value; keep one")
-    if options.float32 and options.compression == "dwaa":
-        raise ProjectError("--compression dwaa keeps 16 bits of a value and --float writes 32; keep one")
+    _check_bits(options)
     from ...io.project.project_file import read_project
     from .framing import framed
     from .look_flags import photographed, put_look, settings_of
@@ -165,6 +151,14 @@ def project_of_options(
         settings, found = placed(settings, options, len(options.light), counted_px, over_time=timeline is not None)
         remarks += found
     return flags, settings, remarks
+
+
+def _check_bits(options: RenderOptions) -> None:
+    """Raise an error for options that set the bits per value of the EXR differently."""
+    if options.half and options.float32:
+        raise ProjectError("--half and --float both set the bits per value; keep one")
+    if options.float32 and options.compression == "dwaa":
+        raise ProjectError("--compression dwaa keeps 16 bits of a value and --float writes 32; keep one")
 
 
 def _check_places(options: RenderOptions, timeline: dict[str, Any] | None) -> None:

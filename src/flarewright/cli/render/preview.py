@@ -11,6 +11,7 @@ from ...errors import ProjectError
 if TYPE_CHECKING:
     from ...model import Project
     from ...render.render import Rendering
+    from .options.record import RenderOptions
 
 
 @dataclass(frozen=True)
@@ -35,10 +36,7 @@ class PreviewLook:
     lux: float
 
 
-def preview_look(
-    *, view: str | None, exposure: float | None, ev: float | None, shutter: str | None, iso: float | None,
-    lux: str | None, no_png: bool,
-) -> PreviewLook | None:  # fmt: skip
+def preview_look(options: RenderOptions) -> PreviewLook | None:
     """Parse the flags of the PNG; None with --no-png.
 
     Raises
@@ -49,9 +47,11 @@ def preview_look(
     from ...render.image.display import Transform
     from ...render.image.photographic_exposure import SUN_LUX
 
+    view, exposure, ev, iso, lux = options.view, options.exposure, options.ev, options.iso, options.lux
+    shutter = options.shutter
     given = {"--exposure": exposure, "--ev": ev, "--shutter": shutter, "--iso": iso, "--lux": lux, "--view": view}
     flags = [flag for flag, value in given.items() if value is not None]
-    if no_png:
+    if options.no_png:
         if flags:
             raise ProjectError(f"{flags[0]} is for the PNG and --no-png omits it; keep one")
         return None

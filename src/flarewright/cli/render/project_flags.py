@@ -226,22 +226,12 @@ def check_focus(lens: str | Lens, focus: float | None, sensor_distance: float | 
 
 def _sections(flags: RenderOptions) -> dict[str, dict[str, Any]]:
     """Return settings of camera, quality and output from the flags, by section and key."""
-    size = None
-    if flags.size is not None:
-        width, height = pair(flags.size, "--size", "1280x720", "x")
-        if width != int(width) or height != int(height):
-            raise ProjectError(f"--size {flags.size!r} is not two whole numbers of pixels; write --size 1280x720")
-        size = (int(width), int(height))
-    dirt_image = None if flags.dirt_image is None else str(flags.dirt_image)
-    if dirt_image is not None and not Path(dirt_image).is_file():
-        raise ProjectError(f"--dirt-image {dirt_image} {_no_file(dirt_image)}; give a grey PNG or EXR image")
     # a camera's name is resolved in `framing`, which also needs the size of the picture
     stated = flags.sensor is not None and not is_camera_name(flags.sensor)
-    sensor = pair(flags.sensor or "", "--sensor", "36x24 (mm)", "x") if stated else None
     return {
         "camera": {
-            "size_px": size,
-            "sensor_mm": sensor,
+            "size_px": None if flags.size is None else _size_px(flags.size),
+            "sensor_mm": pair(flags.sensor or "", "--sensor", "36x24 (mm)", "x") if stated else None,
             "sensor_distance": flags.sensor_distance,
             "focus_distance": flags.focus,
             "cover_glass": None if flags.cover_glass is None else parse_plate(flags.cover_glass, "--cover-glass"),
@@ -267,7 +257,7 @@ def _sections(flags: RenderOptions) -> dict[str, dict[str, Any]]:
             "dust_per_mm2": flags.dust,
             "scratches_per_cm2": flags.scratches,
             "fingerprint": flags.fingerprint,
-            "image": dirt_image,
+            "image": None if flags.dirt_image is None else _dirt_image(flags.dirt_image),
             "seed": flags.seed,
         },
         "starburst": {
@@ -286,6 +276,20 @@ def _sections(flags: RenderOptions) -> dict[str, dict[str, Any]]:
             "matte_ranks": flags.matte_ranks,
         },
     }
+
+
+def _size_px(text: str) -> tuple[int, int]:
+    """Return the numbers of `--size`; whether a picture can have them is for the project to say."""
+    width, height = pair(text, "--size", "1280x720", "x")
+    if width != int(width) or height != int(height):
+        raise ProjectError(f"--size {text!r} is not two whole numbers of pixels; write --size 1280x720")
+    return int(width), int(height)
+
+
+def _dirt_image(path: Path) -> str:
+    if not path.is_file():
+        raise ProjectError(f"--dirt-image {path} {_no_file(str(path))}; give a grey PNG or EXR image")
+    return str(path)
 
 
 def _lights(flags: RenderOptions, base: tuple[Light, ...]) -> list[dict[str, Any]]:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ...model import Project
     from ...plates.settings import PlateSettings
     from ...workflow.plates.plate_sources import PlateShot
+    from ...workflow.shot import ShotResult
     from ...workflow.shot_frame import FrameResult
 
 EPILOG = (
@@ -79,37 +80,44 @@ def shot(options: ShotOptions) -> None:
             announce=print_remark,
             radiance=options.radiance,
         )
+    seconds = time.monotonic() - started
     remarks = [*remarks, *result.remarks]
     print_remarks(remarks)
-    drawn = sum(frame.drawn for frame in result.frames)
-    seconds = time.monotonic() - started
     if options.as_json:
-        print_json(
-            {
-                "frames": [
-                    {"frame": frame.frame, "file": frame.file, "drawn": frame.drawn, "subframes": frame.subframes}
-                    for frame in result.frames
-                ],
-                "drawn": drawn,
-                "kept": len(result.frames) - drawn,
-                "processes": result.processes,
-                "seconds": round(seconds, 3),
-                "fps": project.timeline.fps,
-                "start": project.timeline.start,
-                **({} if result.plate is None else {"plate": _plate_data(result.plate)}),
-                **({} if result.movie is None else {"movie": film_data(result.movie)}),
-                "remarks": remarks,
-            }
-        )
+        print_json({**_data(result, project, seconds), "remarks": remarks})
     else:
-        from ...io.files.sentences import count
+        _print(result, seconds)
 
-        kept = len(result.frames) - drawn
-        words = [f"wrote {count(drawn, 'frame')} in {seconds:.1f} s"] if drawn else []
-        words += [f"kept {count(kept, 'frame')} that the same settings made"] if kept else []
-        print_remarks([", ".join(words) or "no frame was to be drawn"])
-        if result.movie is not None:
-            print_remarks([film_words(result.movie)])
+
+def _data(result: ShotResult, project: Project, seconds: float) -> dict[str, Any]:
+    """Return what became of a shot as JSON data."""
+    drawn = sum(frame.drawn for frame in result.frames)
+    return {
+        "frames": [
+            {"frame": frame.frame, "file": frame.file, "drawn": frame.drawn, "subframes": frame.subframes}
+            for frame in result.frames
+        ],
+        "drawn": drawn,
+        "kept": len(result.frames) - drawn,
+        "processes": result.processes,
+        "seconds": round(seconds, 3),
+        "fps": project.timeline.fps,
+        "start": project.timeline.start,
+        **({} if result.plate is None else {"plate": _plate_data(result.plate)}),
+        **({} if result.movie is None else {"movie": film_data(result.movie)}),
+    }
+
+
+def _print(result: ShotResult, seconds: float) -> None:
+    from ...io.files.sentences import count
+
+    drawn = sum(frame.drawn for frame in result.frames)
+    kept = len(result.frames) - drawn
+    words = [f"wrote {count(drawn, 'frame')} in {seconds:.1f} s"] if drawn else []
+    words += [f"kept {count(kept, 'frame')} that the same settings made"] if kept else []
+    print_remarks([", ".join(words) or "no frame was to be drawn"])
+    if result.movie is not None:
+        print_remarks([film_words(result.movie)])
 
 
 def _check_movie(options: ShotOptions) -> None:
