@@ -11,11 +11,10 @@ import pytest
 
 from flarewright import __version__
 from flarewright.cli.app import run
-from flarewright.cli.common import checkpoints, end_as_interrupted, stop_on_interrupt, was_interrupted
+from flarewright.cli.common import end_as_interrupted, stop_on_interrupt, was_interrupted
 from flarewright.design.results import report
 from flarewright.design.solvers import pool_search
 from flarewright.design.thesis import benchmark as thesis
-from flarewright.errors import OutputError
 from flarewright.io.lens.toml_lens import read_lens
 from flarewright.io.project.project_file import project_text, read_project
 from flarewright.model import Lens
@@ -277,7 +276,7 @@ def test_an_ended_and_a_killed_search_resume_to_the_same_lenses(folder, plain, r
     assert run(["design", "resume", "cut", *SEARCH]) == 0
     assert made(folder / "cut") == whole
 
-    monkeypatch.setattr("flarewright.cli.common.CHECKPOINT_S", 0.001)
+    monkeypatch.setattr("flarewright.workflow.checkpoints.CHECKPOINT_S", 0.001)
     stored = threading.Event()
     write = report.write_state
 
@@ -350,21 +349,6 @@ def test_signals_that_end_a_command(default_signals):
     with pytest.raises(KeyboardInterrupt):
         signal.raise_signal(signal.SIGTERM)
     assert was_interrupted()
-
-
-def test_a_checkpoint_that_cannot_be_written_is_reported_once(monkeypatch, capsys):
-    monkeypatch.setattr("flarewright.cli.common.CHECKPOINT_S", 0.0)
-    tries, third = [], threading.Event()
-
-    def full():
-        tries.append(1)
-        if len(tries) == 3:
-            third.set()
-        raise OutputError("cannot write found/search.json: no space left on device")
-
-    with checkpoints(full):
-        assert third.wait(60.0)
-    assert capsys.readouterr().err.count("cannot write found/search.json") == 1
 
 
 def test_a_search_from_scratch_resumes_under_its_name(folder, plain):

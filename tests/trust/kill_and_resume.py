@@ -32,8 +32,8 @@ KIND = "kill"
 # run a command with checkpoints every 50 ms, so that a tiny job has some
 CHILD = """
 import sys
-from flarewright.cli import common
-common.CHECKPOINT_S = 0.05
+from flarewright.workflow import checkpoints
+checkpoints.CHECKPOINT_S = 0.05
 if sys.argv[1] == "render":
     from flarewright.render.image import partial_picture
     from flarewright.render.reference import estimator

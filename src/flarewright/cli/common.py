@@ -12,11 +12,11 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from threading import Event, Thread
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FlarewrightError, OutputError, ProjectError
+from ..workflow.checkpoints import checkpoints
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -273,7 +273,7 @@ def remembered(cache: Path | None, output: Path | None = None, unnamed: str = ""
 
     failed = False
     try:
-        with checkpoints(store):
+        with checkpoints(store, print_remark):
             yield memory
     except BaseException:
         failed = True
@@ -303,40 +303,6 @@ def _unnamed_partial(text: str) -> Path:
 
 FORGOTTEN_S = 30.0 * 86400.0
 """Age at which partial work in the state folder is deleted."""
-CHECKPOINT_S = 10.0
-"""Time between two checkpoints of a long job, unless writing takes more than a tenth of it."""
-
-
-@contextmanager
-def checkpoints(store: Callable[[], None]) -> Iterator[None]:
-    """Store the state of a job every `CHECKPOINT_S` during the block, on a thread; a full disk does not end the job.
-
-    Parameters
-    ----------
-    store : callable
-        Writes the state; raises OutputError if that fails.
-    """
-    over = Event()
-
-    def work() -> None:
-        pause, reported = CHECKPOINT_S, False
-        while not over.wait(pause):
-            started = time.perf_counter()
-            try:
-                store()
-            except OutputError as error:
-                if not reported:
-                    print_remarks([f"no checkpoint: {error}"])
-                reported = True
-            pause = max(CHECKPOINT_S, 10.0 * (time.perf_counter() - started))
-
-    thread = Thread(target=work, name="checkpoints", daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()
 
 
 @contextmanager

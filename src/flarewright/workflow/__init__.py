@@ -5,8 +5,7 @@ The command line and other front ends call these functions; nothing here prints.
 - `measure_run`: `run_stages` runs the stages of a measurement in a run's folder (`StageResult`)
 - `measure_merge`: `merge_on` merges photographs, on this machine or on a cluster
 - `measure_provenance`: `STAGES`; records from which model the file of a later stage was made
-- `lens_search`: `search_lenses` searches lenses for a project's targets and returns a `LensSearch`
-- `search_restarts`: `search_restarts` searches several times independently, by processes or on a cluster
+- `searches`: `search_lenses` searches lenses for a project's targets, `search_in_folder` writes them and resumes
 - `flare_curves`: `flare_curves` predicts a lens' flare over the constellation
 - `lens_flares`: `lens_flares`, `scene_flare` and `camera_project` build the flares that a prediction needs
 - `flare_pictures`: `pictures_elsewhere`, processes or a cluster that draw the pictures of predictions
@@ -29,6 +28,7 @@ The command line and other front ends call these functions; nothing here prints.
 - `frame_files`: `with_frame_files`, the files of one frame of sequences that hide lights
 - `motion_blur`: `subframe_count` and `mean_layers`, the mean over the open shutter
 - `training_pairs`: `dataset` draws training pairs for flare removal and detection
+- `checkpoints`: `checkpoints` stores the state of a long job every few seconds
 - `long_jobs`: `JOBS` lists the commands that can run for more than a minute, and how each keeps its partial work
 - `defaults`: default sizes of predictions
 """
@@ -44,14 +44,16 @@ if TYPE_CHECKING:
     from .lens_flares import camera_project as camera_project
     from .lens_flares import lens_flares as lens_flares
     from .lens_flares import scene_flare as scene_flare
-    from .lens_search import LensSearch as LensSearch
-    from .lens_search import search_lenses as search_lenses
     from .light_places import lights_at_pixels as lights_at_pixels
     from .light_places import with_tracks as with_tracks
     from .measure_provenance import STAGES as STAGES
     from .measure_run import StageResult as StageResult
     from .measure_run import run_stages as run_stages
     from .project_files import open_project_files as open_project_files
+    from .searches.lens_search import LensSearch as LensSearch
+    from .searches.lens_search import search_lenses as search_lenses
+    from .searches.search_folder import SearchLimits as SearchLimits
+    from .searches.search_folder import search_in_folder as search_in_folder
     from .shot import ShotResult as ShotResult
 
 __all__, __getattr__, __dir__ = lazy_names(
@@ -59,11 +61,12 @@ __all__, __getattr__, __dir__ = lazy_names(
     {
         ".flare_curves": ("flare_curves",),
         ".lens_flares": ("camera_project", "lens_flares", "scene_flare"),
-        ".lens_search": ("LensSearch", "search_lenses"),
         ".light_places": ("lights_at_pixels", "with_tracks"),
         ".measure_provenance": ("STAGES",),
         ".measure_run": ("StageResult", "run_stages"),
         ".project_files": ("open_project_files",),
+        ".searches.lens_search": ("LensSearch", "search_lenses"),
+        ".searches.search_folder": ("SearchLimits", "search_in_folder"),
         ".shot": ("ShotResult",),
     },
 )

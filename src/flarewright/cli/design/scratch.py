@@ -9,7 +9,8 @@ import typer
 from ...errors import OutputError, ProjectError
 from ..common import field_angles, pair
 from .checks import check_fitness, check_time
-from .solve import Fitness, Json, Lenses, Output, Searches, Seed, Solver, Threads, Time, search
+from .options import Fitness, Json, Lenses, Output, Searches, Seed, Solver, Surfaces, Threads, Time
+from .solve import print_search, search
 
 EPILOG = (
     "Examples:\n\nflarewright design scratch --light 10,5 --ghost 4,1.5 --ghost -6,0.8 --ghost -11,3 -o found\n\n"
@@ -28,10 +29,7 @@ def scratch(
         ),
     ] = None,
     random: Annotated[int | None, typer.Option(min=1, max=60, help="Number of random ghosts, by --seed.")] = None,
-    surfaces: Annotated[
-        int | None,
-        typer.Option(min=2, max=60, help="Number of surfaces without the stop (default: the fewest possible)."),
-    ] = None,
+    surfaces: Surfaces = None,
     stop_diameter: Annotated[float | None, typer.Option(help="Diameter of the stop, mm (default: free).")] = None,
     unsigned: Annotated[
         bool, typer.Option("--unsigned", help="Do not distinguish upright and inverted ghosts.")
@@ -62,6 +60,7 @@ def scratch(
     from ...design.solvers.pool_search import PoolState
     from ...design.solvers.solvers import chosen
     from ...model import GhostTarget
+    from ...workflow.searches.search_folder import SearchLimits
 
     ghost_targets = (
         tuple(GhostTarget(place_mm=place, radius_mm=radius) for place, radius in places)
@@ -71,7 +70,8 @@ def scratch(
     project = scratch_project(
         ghost_targets, angles, surfaces=surfaces, stop_diameter=stop_diameter, signed=not unsigned
     )
-    search(
-        project, output, time_s, PoolState(seed), lenses, searches, threads, as_json, name="From scratch",
-        choice=chosen(solver), measure=measure,
-    )  # fmt: skip
+    limits = SearchLimits(time_s, lenses, searches, threads)
+    found = search(
+        project, output, PoolState(seed), limits, name="From scratch", choice=chosen(solver), measure=measure
+    )
+    print_search(output, found, as_json)

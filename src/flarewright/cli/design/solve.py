@@ -3,26 +3,40 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ...errors import OutputError, ProjectError
-from ..common import checkpoints, print_json, print_remark, print_remarks, stop_on_interrupt
+from ..common import print_json, print_remark, print_remarks, stop_on_interrupt
 from .checks import check_fitness, check_time
+from .options import (
+    Cluster,
+    Fitness,
+    Json,
+    Lenses,
+    Output,
+    Processes,
+    Restarts,
+    Searches,
+    Seed,
+    Solver,
+    Threads,
+    Time,
+)
 
 if TYPE_CHECKING:
-    from ...design.finishing.candidate import Outcome
     from ...design.finishing.constraints import Breach
-    from ...design.problem.problem import Problem
     from ...design.solvers.genes import Measure
     from ...design.solvers.pool_search import PoolState
     from ...design.solvers.solvers import Choice
     from ...model import Project
-    from ...workflow.search_restarts import Sharing
+    from ...workflow.searches.lens_search import LensSearch
+    from ...workflow.searches.search_folder import FolderSearch, SearchLimits
+    from ...workflow.searches.search_restarts import Sharing
 
 EPILOG = (
     "Examples:\n\nflarewright design solve shot.toml -o found --time 60\n\n"
@@ -30,43 +44,6 @@ EPILOG = (
     "flarewright design solve shot.toml -o many --restarts 8 --cluster local:4\n\n"
     "flarewright render found/lens-1.toml --light 10,5 -o flare.exr"
 )
-
-Output = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for lenses and report.")]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of the random numbers (default: 0).")]
-Time = Annotated[
-    float, typer.Option("--time", help="Seconds to search; Ctrl-C ends the search earlier and keeps the best.")
-]
-Lenses = Annotated[int, typer.Option("--lenses", min=1, max=50, help="Largest number of lenses to write (default: 5).")]
-Threads = Annotated[
-    int | None, typer.Option(min=1, help="Number of threads, without effect on the lenses (default: all cores).")
-]
-Searches = Annotated[
-    int | None, typer.Option(min=1, help="Approximate number of local searches (evaluations) after which to end.")
-]
-Restarts = Annotated[
-    int,
-    typer.Option(
-        "--restarts", min=1, max=1000,
-        help="Number of independent searches, each of --time and --searches, whose best lenses are merged.",
-    ),
-]  # fmt: skip
-Processes = Annotated[
-    int | None, typer.Option(min=1, help="Number of processes that search, for --restarts (default: one per core).")
-]
-Cluster = Annotated[
-    str | None,
-    typer.Option(
-        metavar="WHERE", help="Search on a Dask cluster, for --restarts: local:N, tcp://HOST:PORT or slurm:FILE."
-    ),
-]
-Solver = Annotated[
-    str,
-    typer.Option(
-        help="Solver: pools (ours), pso, sade, de, de1220, gaco or cmaes; pso:5x30 is 5 islands of 30 per gene."
-    ),
-]
-Fitness = Annotated[str, typer.Option(help="Fitness of evolutionary solvers: ours, or algorithm1 of the thesis.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
 def solve(
@@ -92,9 +69,11 @@ def solve(
     check_time(time_s)
     measure = check_fitness(fitness)
     sharing = _sharing(output, restarts, processes, cluster, threads)
+    from ...design.solvers.pool_search import PoolState
     from ...design.solvers.solvers import chosen
     from ...io.project.project_file import read_project
-    from ...workflow.search_restarts import FOLDER
+    from ...workflow.searches.search_folder import SearchLimits
+    from ...workflow.searches.search_restarts import FOLDER
 
     choice = chosen(solver)
     given = read_project(project)
@@ -105,12 +84,8 @@ def solve(
                           "choose another folder")  # fmt: skip
     if sharing is not None and any((output / FOLDER).glob("*.json")):
         raise OutputError(f"{output / FOLDER} holds searches of an earlier command; choose another folder")
-    from ...design.solvers.pool_search import PoolState
-
-    search(
-        given, output, time_s, PoolState(seed, restarts=restarts), lenses, searches, threads, as_json, choice=choice,
-        measure=measure, sharing=sharing,
-    )  # fmt: skip
+    limits, state = SearchLimits(time_s, lenses, searches, threads), PoolState(seed, restarts=restarts)
+    print_search(output, search(given, output, state, limits, choice=choice, measure=measure, sharing=sharing), as_json)
 
 
 def resume(
@@ -127,13 +102,13 @@ def resume(
     check_time(time_s)
     from ...design.solvers.search_state import read_search
     from ...io.project.project_file import read_project
+    from ...workflow.searches.search_folder import SearchLimits
 
     state, name = read_search(folder / "search.json")
     sharing = _sharing(folder, state.restarts, processes, cluster, threads)
-    search(
-        read_project(folder / "project.toml"), folder, time_s, state, lenses, searches, threads, as_json, name=name,
-        sharing=sharing,
-    )  # fmt: skip
+    limits = SearchLimits(time_s, lenses, searches, threads)
+    found = search(read_project(folder / "project.toml"), folder, state, limits, name=name, sharing=sharing)
+    print_search(folder, found, as_json)
 
 
 def _sharing(
@@ -141,7 +116,7 @@ def _sharing(
 ) -> Sharing | None:
     """Return who works off the restarts; None: there is one search."""
     from ...jobs.cluster.executor import workers_of
-    from ...workflow.search_restarts import Sharing
+    from ...workflow.searches.search_restarts import Sharing
 
     workers_of(cluster, processes, threads)
     if restarts > 1:
@@ -156,111 +131,49 @@ def _sharing(
 
 
 def search(
-    project: Project, folder: Path, time_s: float, state: PoolState, lenses: int, searches: int | None,
-    threads: int | None, as_json: bool, name: str | None = None,
-    choice: Choice | None = None, measure: Measure = "ours", talk: bool = True,
-    resume_by: str | None = None, sharing: Sharing | None = None,
-) -> tuple[Problem, tuple[Outcome, ...], dict[str, Any]]:  # fmt: skip
-    """Search, write the folder and print the result.
+    project: Project, folder: Path, state: PoolState, limits: SearchLimits, *, name: str | None = None,
+    choice: Choice | None = None, measure: Measure = "ours", sharing: Sharing | None = None,
+    resume_by: str | None = None,
+) -> FolderSearch:  # fmt: skip
+    """Search with a display of the progress, until Ctrl-C, and print remarks.
 
     Parameters
     ----------
-    project : Project
-    folder : Path
-    time_s : float
-    state : PoolState
-        Start of the search, or a search to resume.
-    lenses : int
-    searches : int or None
-    threads : int or None
-    as_json : bool
-    name : str, optional
-        Name of the lenses; None: after the project's lens.
-    choice : Choice, optional
-        None: pools of local minima.
-    measure : {"ours", "algorithm1"}
-        Fitness for evolutionary solvers.
-    talk : bool
-        False: the caller prints the result.
+    project, folder, state, limits, name, choice, measure, sharing
+        As for `search_in_folder`.
     resume_by : str, optional
         What the user runs to resume; None: `design resume`.
-    sharing : Sharing, optional
-        Who works off the restarts of `state`.
 
     Returns
     -------
-    problem : Problem
-    found : tuple of Outcome
-    data : dict
-        Facts for JSON.
+    FolderSearch
     """
-    from ...design.results.report import search_summary, write_checkpoint, write_folder
-    from ...io.files.atomic_write import make_folder
-    from ...workflow.lens_search import search_lenses
+    from ...workflow.searches.search_folder import search_in_folder
 
-    latest, stored = state, state
-
-    def store() -> None:
-        nonlocal stored
-        if (now := latest) is not stored:
-            write_checkpoint(folder, project, now, name)
-            stored = now
-
-    def observer(unit: str) -> Callable[[PoolState], None]:
-        # the project is valid by now, and the search starts
-        make_folder(folder)
-        show = watching.enter_context(_progress_display(unit))
-        watching.enter_context(checkpoints(store))
-
-        def note(now: PoolState) -> None:
-            nonlocal latest
-            latest = now
-            if sharing is not None and stored is state:
-                # restarts keep their own states from now on; this names their number
-                store()
-            if show is not None:
-                show(now)
-
-        return note
-
-    with stop_on_interrupt() as asked, ExitStack() as watching:
-        done = search_lenses(
-            project, time_s=time_s, state=state, lenses=lenses, searches=searches, threads=threads, choice=choice,
-            measure=measure, name=name, report=print_remark, progress=observer, cancelled=asked,
-            sharing=sharing,
+    with stop_on_interrupt() as asked:
+        found = search_in_folder(
+            project, folder, state, limits, choice=choice, measure=measure, name=name, report=print_remark,
+            display=_progress_display, cancelled=asked, sharing=sharing,
         )  # fmt: skip
-    problem, found, proven, conflict = done.problem, done.outcomes, done.obstacles, done.conflict
-    remarks = write_folder(folder, project, problem, done.state, found, proven, conflict, name)
-    if asked():
-        remarks.append(f"ended early; to resume: {resume_by or f'flarewright design resume {folder}'}")
-    data = search_summary(done.state, found, problem, proven, conflict)
-    print_remarks([*(done.settled.remarks if name is None else ()), *remarks])
-    if talk and as_json:
-        print_json({"folder": str(folder), **data})
-    elif talk:
-        _print(folder, problem, found, str(data["verdict"]), conflict)
-    return problem, found, data
+    print_remarks(found.remarks)
+    if found.cut_off:
+        print_remark(f"ended early; to resume: {resume_by or f'flarewright design resume {folder}'}")
+    return found
 
 
-def _print(
-    folder: Path, problem: Problem, found: tuple[Outcome, ...], verdict: str, conflict: tuple[Breach, ...]
-) -> None:
+def print_search(folder: Path, found: FolderSearch, as_json: bool) -> None:
+    """Print the result of a search."""
+    if as_json:
+        print_json({"folder": str(folder), **found.summary})
+        return
     from ...io.files.sentences import count
 
-    words = {"met": "all targets are met", "nearly": "all targets are nearly met",
-             "impossible": "no lens can meet the targets, see above; the nearest are written",
-             "contradictory": "the hard limits contradict each other: the nearest lens with any ghosts breaks "
-                              + " and ".join(f"{one.name} by {one.amount:.2g}" for one in conflict),
-             "unsolved": "the targets are not met; the report lists all errors"}  # fmt: skip
-    if found and found[0].breaks and verdict == "unsolved":
-        words["unsolved"] = (
-            f"no lens was found that keeps {', '.join(problem.bounds.hard)}, though there are some with other ghosts; "
-            "search longer, or widen the bounds; the nearest are written"
-        )
-    print(f"{words[verdict]}: {count(len(found), 'lens', 'lenses')} in {folder}, report in {folder / 'report.html'}")
-    for number, one in enumerate(found, 1):
+    search, verdict = found.search, found.summary["verdict"]
+    lenses = count(len(search.outcomes), "lens", "lenses")
+    print(f"{_words(search, verdict)}: {lenses} in {folder}, report in {folder / 'report.html'}")
+    for number, one in enumerate(search.outcomes, 1):
         if one.breaks:
-            print(f"lens-{number} breaks {', '.join(f'{each.name} by {each.amount:.2g}' for each in one.breaks)}")
+            print(f"lens-{number} breaks {_listed(one.breaks, ', ')}")
         if one.fitness_traced is not None:
             print(f"lens-{number}: weighted misfit of traced ghosts {one.fitness_traced[1]:.3g} "
                   f"({one.fitness_traced[0]:.3g} before finishing)"
@@ -268,6 +181,30 @@ def _print(
         if one.fitness_any_index is not None:
             print(f"lens-{number}: fitness {one.fitness:.3g} mm^2 with {', '.join(one.glasses.values())} "
                   f"({one.fitness_any_index:.3g} with any index)")  # fmt: skip
+
+
+def _words(search: LensSearch, verdict: str) -> str:
+    """Return what a verdict means for the user."""
+    match verdict:
+        case "met":
+            return "all targets are met"
+        case "nearly":
+            return "all targets are nearly met"
+        case "impossible":
+            return "no lens can meet the targets, see above; the nearest are written"
+        case "contradictory":
+            breaks = _listed(search.conflict, " and ")
+            return f"the hard limits contradict each other: the nearest lens with any ghosts breaks {breaks}"
+    if search.outcomes and search.outcomes[0].breaks:
+        return (
+            f"no lens was found that keeps {', '.join(search.problem.bounds.hard)}, though there are some with other "
+            "ghosts; search longer, or widen the bounds; the nearest are written"
+        )
+    return "the targets are not met; the report lists all errors"
+
+
+def _listed(breaks: Sequence[Breach], joint: str) -> str:
+    return joint.join(f"{one.name} by {one.amount:.2g}" for one in breaks)
 
 
 @contextmanager

@@ -8,6 +8,7 @@ Public entry points: `solvers.chosen`, `solvers.solve_with`, `solvers.make_ready
 - `polish`: local searches, and merging of their minima
 - `least_squares`: one Levenberg-Marquardt step inside bounds
 - `restarts`: `restart_seed` and `merged`, independent searches of one problem
+- `restart_limit`: `MOST_RESTARTS`, the largest number of restarts
 - `search_state`: a search as a file that can be resumed
 - `genes`: `Genes`, a lens as numbers from 0 to 1 for evolutionary solvers
 - `evolution`: pygmo's algorithms on an archipelago

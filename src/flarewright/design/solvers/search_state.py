@@ -15,12 +15,11 @@ from ...io.files.text_file import read_json
 from ..problem.prescription import Structure
 from ..problem.problem import LensCandidate
 from .pool_search import PoolState, Run
+from .restart_limit import MOST_RESTARTS
 
 VERSION = 1
 # bytes; a search of days has some megabytes
 _LARGEST = 256_000_000
-# as many searches as `flarewright design solve --restarts` starts
-_MOST_RESTARTS = 1000
 
 
 def write_state(state: PoolState, path: Path, name: str | None = None) -> None:
@@ -96,7 +95,7 @@ def read_search(path: Path) -> tuple[PoolState, str | None]:
             tuple(_read_candidate(one) for one in data["ended"]), int(data["next_run"]), int(data["searches"]),
             float(data["seconds"]), int(data.get("restarts", 1)),
         )  # fmt: skip
-        if not 1 <= state.restarts <= _MOST_RESTARTS:
+        if not 1 <= state.restarts <= MOST_RESTARTS:
             raise ValueError("an impossible number of searches")
         return state, data.get("name")
     except FileError as error:

@@ -7,19 +7,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..errors import ProjectError
-from ..typing import Report
+from ...errors import ProjectError
+from ...typing import Report
 
 if TYPE_CHECKING:
-    from ..design.finishing.candidate import Outcome
-    from ..design.finishing.constraints import Breach
-    from ..design.problem.impossible import Obstacle
-    from ..design.problem.problem import Over, Problem
-    from ..design.solvers.genes import Measure
-    from ..design.solvers.pool_search import Observer, PoolState
-    from ..design.solvers.solvers import Choice
-    from ..model import Iris, Project
-    from ..render.scene.resolve import ResolvedProject
+    from ...design.finishing.candidate import Outcome
+    from ...design.finishing.constraints import Breach
+    from ...design.problem.impossible import Obstacle
+    from ...design.problem.problem import Over, Problem
+    from ...design.solvers.genes import Measure
+    from ...design.solvers.pool_search import Observer, PoolState
+    from ...design.solvers.solvers import Choice
+    from ...model import Iris, Project
+    from ...render.scene.resolve import ResolvedProject
     from .search_restarts import Sharing
 
 FINISHING = 0.15
@@ -122,11 +122,11 @@ def search_lenses(
     >>> found = search_lenses(project, time_s=5.0)  # doctest: +SKIP
     >>> found.outcomes[0].fitness  # doctest: +SKIP
     """
-    from ..design.problem.impossible import obstacles
-    from ..design.problem.target import problem_of
-    from ..design.solvers.evolution_log import until
-    from ..design.solvers.pool_search import PoolState
-    from ..design.solvers.solvers import Limits, chosen, make_ready, solve_with
+    from ...design.problem.impossible import obstacles
+    from ...design.problem.target import problem_of
+    from ...design.solvers.evolution_log import until
+    from ...design.solvers.pool_search import PoolState
+    from ...design.solvers.solvers import Limits, chosen, make_ready, solve_with
     from .search_restarts import search_restarts
 
     problem, settled = problem_of(project)
@@ -162,8 +162,8 @@ def _best(
     state: PoolState, problem: Problem, count: int, name: str, iris: Iris | None, over: Over
 ) -> tuple[tuple[Outcome, ...], tuple[Breach, ...]]:
     """Return the best lenses; if none meets the hard limits, the nearest ones and the contradicting limits."""
-    from ..design.finishing.candidate import nearest_outcomes, outcomes
-    from ..design.finishing.constraints import without_ghosts
+    from ...design.finishing.candidate import nearest_outcomes, outcomes
+    from ...design.finishing.constraints import without_ghosts
 
     found = outcomes(state, problem, count=count, name=name, iris=iris, over=over)
     if found or not problem.bounds.hard:

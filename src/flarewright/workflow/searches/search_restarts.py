@@ -12,24 +12,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from uuid import uuid4
 
-from ..errors import FlarewrightError, ProjectError
-from ..io.files.atomic_write import make_folder, write_bytes_atomically
-from ..jobs.cluster.executor import open_cluster, workers_of
-from ..jobs.processes import fitting, shares, work_off
-from ..jobs.worker import WRITING
+from ...errors import FlarewrightError, ProjectError
+from ...io.files.atomic_write import make_folder, write_bytes_atomically
+from ...jobs.cluster.executor import open_cluster, workers_of
+from ...jobs.processes import fitting, shares, work_off
+from ...jobs.worker import WRITING
 
 if TYPE_CHECKING:
-    from ..design.problem.problem import Problem
-    from ..design.solvers.evolution_log import Limits
-    from ..design.solvers.genes import Measure
-    from ..design.solvers.pool_search import Observer, PoolState
-    from ..design.solvers.solvers import Choice
-    from ..jobs.cluster.executor import Cluster
-    from ..typing import Report
+    from ...design.problem.problem import Problem
+    from ...design.solvers.evolution_log import Limits
+    from ...design.solvers.genes import Measure
+    from ...design.solvers.pool_search import Observer, PoolState
+    from ...design.solvers.solvers import Choice
+    from ...jobs.cluster.executor import Cluster
+    from ...typing import Report
 
 FOLDER = "restarts"
 """Folder, in that of a search, with the states of its restarts."""
-_SEARCH = "flarewright.workflow.search_restarts:restart_on_worker"
+_SEARCH = "flarewright.workflow.searches.search_restarts:restart_on_worker"
 _RUNNING = ".searching-"
 # time between two checkpoints, and between two looks at whether the command still runs, seconds
 _STORE_S, _LOOK_S = 10.0, 1.0
@@ -122,8 +122,8 @@ class _Board:
     """
 
     def __init__(self, plan: RestartPlan, seed: int, restarts: int, progress: Observer | None) -> None:
-        from ..design.solvers.pool_search import PoolState
-        from ..design.solvers.restarts import restart_seed
+        from ...design.solvers.pool_search import PoolState
+        from ...design.solvers.restarts import restart_seed
 
         self.plan, self.seed, self.progress = plan, seed, progress
         seeds = [restart_seed(seed, number) for number in range(restarts)]
@@ -133,7 +133,7 @@ class _Board:
 
     def items(self, time_s: float | None) -> list[Restart]:
         """Return the restarts that are not finished, each for a time from now."""
-        from ..design.solvers.pool_search import finished
+        from ...design.solvers.pool_search import finished
 
         return [
             Restart(number, one.seed, None if time_s is None else one.seconds + time_s)
@@ -148,7 +148,7 @@ class _Board:
 
     def show(self) -> None:
         """Report the sums."""
-        from ..design.solvers.restarts import so_far
+        from ...design.solvers.restarts import so_far
 
         if self.progress is not None:
             self.progress(so_far(self.seed, self.states))
@@ -204,7 +204,7 @@ def search_restarts(
     FlarewrightError
         A state is damaged, cannot be written, or belongs to another project; there is no such cluster.
     """
-    from ..design.solvers.restarts import merged
+    from ...design.solvers.restarts import merged
 
     processes = workers_of(sharing.cluster, sharing.processes, threads)
     running = _folder(sharing.folder) / f"{_RUNNING}{uuid4().hex}"
@@ -276,7 +276,7 @@ def _folder(folder: Path) -> Path:
 
 def _stored(plan: RestartPlan, number: int, seed: int) -> PoolState | None:
     """Return the state that a restart has stored; None: it has not started."""
-    from ..design.solvers.search_state import read_state
+    from ...design.solvers.search_state import read_state
 
     path = plan.state_file(number)
     if not path.exists():
@@ -320,9 +320,9 @@ def search_restart(
     FlarewrightError
         The stored state is damaged, or a state cannot be written.
     """
-    from ..design.solvers.pool_search import PoolState
-    from ..design.solvers.search_state import write_state
-    from ..design.solvers.solvers import Limits, make_ready, solve_with
+    from ...design.solvers.pool_search import PoolState
+    from ...design.solvers.search_state import write_state
+    from ...design.solvers.solvers import Limits, make_ready, solve_with
 
     state = _stored(plan, item.number, item.seed) or PoolState(item.seed)
     left = None if item.until_s is None else item.until_s - state.seconds

@@ -25,10 +25,10 @@ from flarewright.design.solvers.search_state import read_state, write_state
 from flarewright.design.solvers.solvers import Limits, chosen
 from flarewright.errors import FlarewrightError, ProjectError
 from flarewright.io.project.project_file import project_text
-from flarewright.workflow.lens_search import search_lenses
-from flarewright.workflow.search_restarts import Restart, RestartPlan, Sharing, search_restart, search_restarts
+from flarewright.workflow.searches.lens_search import search_lenses
+from flarewright.workflow.searches.search_restarts import Restart, RestartPlan, Sharing, search_restart, search_restarts
 
-module = import_module("flarewright.workflow.search_restarts")
+module = import_module("flarewright.workflow.searches.search_restarts")
 MOST = 48
 
 

@@ -1,0 +1,47 @@
+"""Store the state of a long job every few seconds while it runs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Event, Thread
+
+from ..errors import OutputError
+
+CHECKPOINT_S = 10.0
+"""Time between two checkpoints, unless writing takes more than a tenth of it."""
+
+
+@contextmanager
+def checkpoints(store: Callable[[], None], report: Callable[[str], None]) -> Iterator[None]:
+    """Store the state of a job every `CHECKPOINT_S` during the block, on a thread; a full disk does not end the job.
+
+    Parameters
+    ----------
+    store : callable
+        Writes the state; raises OutputError if that fails.
+    report : callable
+        Called with a sentence on the first failure.
+    """
+    over = Event()
+
+    def work() -> None:
+        pause, reported = CHECKPOINT_S, False
+        while not over.wait(pause):
+            started = time.perf_counter()
+            try:
+                store()
+            except OutputError as error:
+                if not reported:
+                    report(f"no checkpoint: {error}")
+                reported = True
+            pause = max(CHECKPOINT_S, 10.0 * (time.perf_counter() - started))
+
+    thread = Thread(target=work, name="checkpoints", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
