@@ -5,25 +5,30 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ...errors import ProjectError
-from ..common import check_place, console, print_json, print_remarks, stop_on_interrupt, write_text
+from ..common import check_place, console, print_json, print_remark, stop_on_interrupt, write_text
+from ..option_record import with_options
 from .checks import check_color_fitness, check_films, check_fitness, check_time
+from .options import Json
 from .partial_work import partial_work
 
 if TYPE_CHECKING:
-    from ...design.solvers.pool_search import PoolState
+    from ...design.solvers.pool_search import Observer
     from ...design.solvers.solvers import Choice, Limits
     from ...design.thesis.figures import Run
     from ...design.thesis.trials import Name, Trial
-    from ...measure.core.checkpoint import Journal
-    from ...typing import Report
+    from ...typing import Floats, Report
+
+    # a run, the picture of its target, and that of what it found
+    Done = tuple[Run, Floats, Floats]
 
 EPILOG = (
     "Examples:\n\nflarewright design benchmark heliar --angle 5.45 --seeds 10 --time 10\n\n"
@@ -33,120 +38,101 @@ EPILOG = (
     "flarewright design benchmark heliar --unsigned --solver pools --solver pso --solver sade --report compared.html"
 )
 
-Solvers = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--solver", help="Solver: pools (ours), pso, sade, de, de1220, gaco or cmaes; pso:5x30 is 5 islands of 30 per "
-        "gene. May be repeated to compare.",
-    ),
-]  # fmt: skip
 
+@dataclass(frozen=True, kw_only=True)
+class BenchmarkOptions:
+    """Options of `flarewright design benchmark`. None or empty: not given."""
 
-def benchmark(
     case: Annotated[
         str,
         typer.Argument(
             metavar="heliar|canon|scratch", help="Lens whose ghosts are the targets; scratch: random ghosts."
         ),
-    ],
-    angle_deg: Annotated[float, typer.Option("--angle", help="Yaw and pitch of the light, degrees.")] = 5.45,
+    ]
+    angle_deg: Annotated[float, typer.Option("--angle", help="Yaw and pitch of the light, degrees.")] = 5.45
     coatings: Annotated[
         str | None, typer.Option(help="Find colours instead, by quarter-wave or free films, or up to 2 or 3 films.")
-    ] = None,
-    ghosts: Annotated[int, typer.Option(min=1, max=60, help="Number of random ghosts per seed, for scratch.")] = 5,
-    seeds: Annotated[int, typer.Option(min=1, max=1000, help="Number of seeds, from 0 (default: 1).")] = 1,
-    time_s: Annotated[float | None, typer.Option("--time", help="Seconds per seed (default: 10).")] = None,
+    ] = None
+    ghosts: Annotated[int, typer.Option(min=1, max=60, help="Number of random ghosts per seed, for scratch.")] = 5
+    seeds: Annotated[int, typer.Option(min=1, max=1000, help="Number of seeds, from 0 (default: 1).")] = 1
+    time_s: Annotated[float | None, typer.Option("--time", help="Seconds per seed (default: 10).")] = None
     cpu_s: Annotated[
         float | None,
         typer.Option(
             "--cpu-time", help="Processor seconds per seed of all cores, instead of --time, for a busy computer."
         ),
-    ] = None,
-    solver: Solvers = None,
+    ] = None
+    solvers: Annotated[
+        list[str],
+        typer.Option(
+            "--solver",
+            help="Solver: pools (ours), pso, sade, de, de1220, gaco or cmaes; pso:5x30 is 5 islands of 30 per "
+            "gene. May be repeated to compare.",
+        ),
+    ] = field(default_factory=list)
     fitness: Annotated[
         str | None,
         typer.Option(
             help="Fitness of evolutionary solvers: algorithm1 (algorithm2 for colours), as the thesis, or ours."
         ),
-    ] = None,
+    ] = None
     unsigned: Annotated[
         bool, typer.Option("--unsigned", help="Use sizes without sign and no brightness, as the thesis.")
-    ] = False,
+    ] = False
     fresnel: Annotated[
         bool, typer.Option("--fresnel", help="Use the irradiance of bare surfaces too, to recover the lens itself.")
-    ] = False,
+    ] = False
     picture: Annotated[
         Path | None, typer.Option(help="Write target and result of the last seed side by side, *.png.")
-    ] = None,
-    report: Annotated[Path | None, typer.Option(help="Write tables, charts and pictures as a page, *.html.")] = None,
-    threads: Annotated[
-        int | None, typer.Option(min=1, help="Number of threads, for ours (default: all cores).")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
-) -> None:
+    ] = None
+    report: Annotated[Path | None, typer.Option(help="Write tables, charts and pictures as a page, *.html.")] = None
+    threads: Annotated[int | None, typer.Option(min=1, help="Number of threads, for ours (default: all cores).")] = None
+    as_json: Json = False
+
+
+@with_options(BenchmarkOptions)
+def benchmark(options: BenchmarkOptions) -> None:
     """Search lenses or coatings with the ghosts of a known lens, and compare the pictures.
 
     Finished runs are kept beside the report or picture: after an interruption, the same command continues.
     """
-    trial = _trial(case, angle_deg, coatings, ghosts, unsigned, fresnel)
-    limits = _limits(time_s, cpu_s)
-    seen = _fitness(fitness, trial)
-    for place, suffix in ((picture, ".png"), (report, ".html")):
+    trial = _trial(options)
+    limits = _limits(options.time_s, options.cpu_s)
+    measure = _fitness(options.fitness, trial)
+    for place, suffix in ((options.picture, ".png"), (options.report, ".html")):
         if place is not None:
             check_place(place, suffix)
-    import numpy as np
-
-    from ...design.problem.grey_picture import png_bytes
-    from ...design.solvers.solvers import chosen
     from ...design.thesis.figures import figure_data
-    from ...design.thesis.figures import write_figures as page
-    from ...io.files.atomic_write import write_bytes_atomically
 
-    choices = [chosen(text) for text in solver or ["pools"]]
-    inputs = [repr(trial), seeds, [one.label for one in choices], time_s, cpu_s, seen]
-    _register_runs()
-    with (
-        stop_on_interrupt() as asked,
-        partial_work(report or picture, inputs, "run", "runs") as steps,
-        _progress_display() as progress,
-    ):
-        done = _run_all(trial, seeds, choices, limits, seen, threads, progress, asked, steps)
-        cut_off = steps.unfinished = asked()
+    done = _run_all(trial, options, limits, measure)
     runs = [run for run, _, _ in done]
-    if cut_off:
-        again = "; to resume: the same command" if report or picture else ""
-        print_remarks([f"ended after {len(done)} of {seeds * len(choices)} runs, the last one cut off{again}"])
-    if picture is not None:
-        data = png_bytes(np.concatenate(done[-1][1:], axis=1))
-        write_bytes_atomically(picture, data)
-        print_remarks([f"wrote {picture}: the target, and what was found"])
-    if report is not None:
-        write_text(report, page(trial, runs, _best_pictures(trial, done)))
-        print_remarks([f"wrote {report}"])
-    if as_json:
+    _write(trial, options, done)
+    if options.as_json:
         print_json({"runs": [asdict(run) for run in runs], "figures": figure_data(trial, runs)})
-        return
-    _print(trial, runs)
+    else:
+        _print(trial, runs)
 
 
-def _trial(case: str, angle_deg: float, coatings: str | None, ghosts: int, unsigned: bool, fresnel: bool) -> Trial:
-    """Return the test of the arguments, checked."""
+def _trial(options: BenchmarkOptions) -> Trial:
+    """Return the test of the options, checked."""
     from ...design.thesis.trials import Trial
 
     name: Name
-    match case:
+    match options.case:
         case "heliar" | "canon" | "scratch":
-            name = case
+            name = options.case
         case _:
-            raise ProjectError(f"there is no test {case!r}; choose heliar or canon, or scratch")
-    if not 0.0 < angle_deg < 60.0:
-        raise ProjectError(f"--angle {angle_deg:g} is no angle for this test; choose one above 0 and below 60 degrees")
-    if unsigned and fresnel:
+            raise ProjectError(f"there is no test {options.case!r}; choose heliar or canon, or scratch")
+    if not 0.0 < options.angle_deg < 60.0:
+        raise ProjectError(
+            f"--angle {options.angle_deg:g} is no angle for this test; choose one above 0 and below 60 degrees"
+        )
+    if options.unsigned and options.fresnel:
         raise ProjectError("--unsigned excludes the brightness and --fresnel needs it; keep one")
-    if case == "scratch" and (coatings is not None or fresnel):
+    if name == "scratch" and (options.coatings is not None or options.fresnel):
         raise ProjectError("scratch has no lens, so neither --coatings nor --fresnel; choose heliar or canon")
-    kind, layers = (None, 1) if coatings is None else check_films(coatings, "--coatings")
-    return Trial(name, angle_deg, ghosts, kind, layers, unsigned, fresnel)
+    kind, layers = (None, 1) if options.coatings is None else check_films(options.coatings, "--coatings")
+    return Trial(name, options.angle_deg, options.ghosts, kind, layers, options.unsigned, options.fresnel)
 
 
 def _limits(time_s: float | None, cpu_s: float | None) -> Limits:
@@ -170,29 +156,48 @@ def _fitness(fitness: str | None, trial: Trial) -> str:
     return "algorithm1" if fitness is None else check_fitness(fitness)
 
 
-def _run_all(
-    trial: Trial, seeds: int, choices: Sequence[Choice], limits: Limits, seen: Any, threads: int | None,
-    progress: Report | None, cancelled: Callable[[], bool], steps: Journal,
-) -> list[tuple[Run, Any, Any]]:  # fmt: skip
-    """Run every solver with every seed, until Ctrl-C, or return the recorded runs."""
+def _run_all(trial: Trial, options: BenchmarkOptions, limits: Limits, measure: Any) -> list[Done]:
+    """Run every solver with every seed until Ctrl-C, from where an interrupted command was."""
+    from ...design.solvers.solvers import chosen
+
+    choices = [chosen(text) for text in options.solvers or ["pools"]]
+    place = options.report or options.picture
+    labels = [one.label for one in choices]
+    inputs = [repr(trial), options.seeds, labels, options.time_s, options.cpu_s, measure]
+    _register_runs()
+    with (
+        stop_on_interrupt() as asked,
+        partial_work(place, inputs, "run", "runs") as steps,
+        _progress_display() as progress,
+    ):
+        run_one = partial(_run_one(trial), trial, measure=measure, threads=options.threads)
+        done: list[Done] = []
+        for choice, seed in product(choices, range(options.seeds)):
+            if done and asked():
+                break
+            shown = replace(limits, progress=_shown(progress, choice, seed), cancelled=asked)
+            done.append(steps.step(partial(run_one, seed=seed, limits=shown, choice=choice), asked))
+        cut_off = steps.unfinished = asked()
+    if cut_off:
+        again = "; to resume: the same command" if place else ""
+        of = options.seeds * len(choices)
+        print_remark(f"ended after {len(done)} of {of} runs, the last one cut off{again}")
+    return done
+
+
+def _run_one(trial: Trial) -> Callable[..., Done]:
+    """Return the function that runs a test with one solver and seed."""
     from ...design.thesis.benchmark import run_trial
     from ...design.thesis.benchmark_colors import run_colors
 
-    run_one: Any = run_trial if trial.films is None else run_colors
-    done: list[tuple[Run, Any, Any]] = []
-    for choice in choices:
-        for seed in range(seeds):
-            if done and cancelled():
-                return done
+    return run_trial if trial.films is None else run_colors
 
-            def show(now: PoolState, choice: Choice = choice, seed: int = seed) -> None:
-                if progress is not None:
-                    progress(f"{choice.label}, seed {seed}: {now.searches} {choice.unit}")
 
-            one = replace(limits, progress=show, cancelled=cancelled)
-            run = partial(run_one, trial, seed=seed, limits=one, choice=choice, measure=seen, threads=threads)
-            done.append(steps.step(run, cancelled))
-    return done
+def _shown(progress: Report | None, choice: Choice, seed: int) -> Observer | None:
+    """Return a callback that shows a solver's state; None: not on a terminal."""
+    if progress is None:
+        return None
+    return lambda now: progress(f"{choice.label}, seed {seed}: {now.searches} {choice.unit}")
 
 
 def _register_runs() -> None:
@@ -205,7 +210,24 @@ def _register_runs() -> None:
         recorded(record)
 
 
-def _best_pictures(trial: Trial, done: Sequence[tuple[Run, Any, Any]]) -> list[tuple[str, Any]]:
+def _write(trial: Trial, options: BenchmarkOptions, done: Sequence[Done]) -> None:
+    """Write the picture and the report, where they are wanted."""
+    import numpy as np
+
+    from ...design.problem.grey_picture import png_bytes
+    from ...design.thesis.figures import write_figures
+    from ...io.files.atomic_write import write_bytes_atomically
+
+    if options.picture is not None:
+        write_bytes_atomically(options.picture, png_bytes(np.concatenate(done[-1][1:], axis=1)))
+        print_remark(f"wrote {options.picture}: the target, and what was found")
+    if options.report is not None:
+        page = write_figures(trial, [run for run, _, _ in done], _best_pictures(trial, done))
+        write_text(options.report, page)
+        print_remark(f"wrote {options.report}")
+
+
+def _best_pictures(trial: Trial, done: Sequence[Done]) -> list[tuple[str, Any]]:
     """Return the target and each solver's best picture; for random ghosts, each beside its target."""
     from ...design.thesis.benchmark import BenchmarkRun
 

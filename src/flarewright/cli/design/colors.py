@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,11 +10,16 @@ import typer
 
 from ...errors import ProjectError
 from ..common import check_place, console, print_json, print_remarks, stop_on_interrupt
+from ..option_record import with_options
 from .checks import check_color_fitness, check_films, check_time
+from .options import Json, Seed
 from .partial_work import partial_work
 
 if TYPE_CHECKING:
+    from ...design.coatings.color_genes import ColorMeasure
     from ...design.coatings.colors import Coatings, ColorProblem
+    from ...design.solvers.solvers import Choice
+    from ...model import Lens, Project
     from ...typing import Floats
 
 EPILOG = (
@@ -22,98 +28,135 @@ EPILOG = (
 )
 
 
-def colors(
-    project: Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file with a \\[design].")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="LENS.toml", help="The coated lens.")],
+@dataclass(frozen=True, kw_only=True)
+class ColorOptions:
+    """Options of `flarewright design colors`."""
+
+    project: Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file with a \\[design].")]
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="LENS.toml", help="The coated lens.")]
     films: Annotated[
         str,
         typer.Option(
             help="quarter-wave: one per surface; free: any index and thickness; 2 or 3: up to that many free ones."
         ),
-    ] = "quarter-wave",
-    judge: Annotated[
-        str, typer.Option(help="Colour difference: linear, relative in R, G, B; oklab, perceptual.")
-    ] = "linear",
+    ] = "quarter-wave"
+    judge: Annotated[str, typer.Option(help="Colour difference: linear, relative in R, G, B; oklab, perceptual.")] = (
+        "linear"
+    )
     pair_map: Annotated[
         str | None, typer.Option("--map", metavar="J-I", help="Also draw the possible colours of the ghost J-I.")
-    ] = None,
+    ] = None
     curves: Annotated[
         int | None,
         typer.Option("--curves", metavar="ROW", help="Also draw the reflectance of quarter waves on this row."),
-    ] = None,
+    ] = None
     starts: Annotated[
         int,
         typer.Option(min=1, max=100000, help="Number of descents of ours; more find better coatings (default: 64)."),
-    ] = 64,
+    ] = 64
     solver: Annotated[
         str,
         typer.Option(help="Solver: ours, pso, sade, de, de1220, gaco or cmaes; pso:5x30 is 5 islands of 30 per gene."),
-    ] = "ours",
+    ] = "ours"
     fitness: Annotated[
         str, typer.Option(help="Fitness of evolutionary solvers: ours, or algorithm2 of the thesis.")
-    ] = "ours",
+    ] = "ours"
     time_s: Annotated[
         float | None,
         typer.Option("--time", help="Seconds (default: 60 for evolutionary solvers, all descents for ours)."),
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the random numbers (default: 0).")] = 0,
-    threads: Annotated[int | None, typer.Option(min=1, help="Number of threads (default: all cores).")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
-) -> None:
+    ] = None
+    seed: Seed = 0
+    threads: Annotated[int | None, typer.Option(min=1, help="Number of threads (default: all cores).")] = None
+    as_json: Json = False
+
+
+@with_options(ColorOptions)
+def colors(options: ColorOptions) -> None:
     """Search coatings of surfaces in air that give ghosts their target colours and keep the colours of the others.
 
     Finished descents are kept beside the output: after an interruption, the same command continues.
     """
-    kind, layers = check_films(films)
-    if judge not in ("linear", "oklab"):
-        raise ProjectError(f"--judge {judge!r} is unknown; choose linear or oklab")
-    measure = check_color_fitness(fitness)
-    check_time(60.0 if time_s is None else time_s)
-    check_place(output, ".toml")
-    from ...design.coatings.color_genes import colors_with
-    from ...design.coatings.colors import coated, color_problem, mirrors_of
-    from ...design.solvers.solvers import Limits, chosen
-    from ...io.lens.lens_writer import write_lens
-    from ...io.project.project_file import project_text, read_project
+    kind, layers = check_films(options.films)
+    if options.judge not in ("linear", "oklab"):
+        raise ProjectError(f"--judge {options.judge!r} is unknown; choose linear or oklab")
+    measure = check_color_fitness(options.fitness)
+    check_time(60.0 if options.time_s is None else options.time_s)
+    check_place(options.output, ".toml")
+    from ...design.coatings.colors import color_problem
+    from ...design.solvers.solvers import chosen
+    from ...io.project.project_file import read_project
 
-    choice = chosen(solver)
-    given = read_project(project)
-    problem, lens = color_problem(given, kind, perceptual=judge == "oklab", layers=layers)
-    names = [f"{j}-{i}" for j, i in problem.structure.pairs]
-    if pair_map is not None and pair_map not in names:
-        raise ProjectError(f"--map {pair_map!r} is no ghost of this lens on one side of its stop, such as {names[0]}")
-    if curves is not None and curves not in mirrors_of(problem.structure):
-        rows = ", ".join(str(k) for k in mirrors_of(problem.structure))
-        raise ProjectError(f"--curves {curves} is no glass surface; the glass surfaces of this lens are rows {rows}")
-    if choice.evolves and time_s is None:
-        time_s = 60.0
-    inputs = [project_text(given), lens.model_dump_json(), kind, layers, judge, starts, seed]
-    with (
-        stop_on_interrupt() as asked,
-        partial_work(output, inputs, "batch of descents", "batches of descents") as steps,
-    ):
-        found = colors_with(
-            choice, problem, limits=Limits(time_s, None, None, asked), starts=starts, seed=seed, measure=measure,
-            threads=threads, step=steps.step,
-        )  # fmt: skip
-        write_lens(coated(lens, problem.rows, kind, found.values), output)
-        steps.unfinished = asked()
-    remarks = [f"wrote {output}", *(["ended early; to resume: the same command"] if asked() else [])]
+    choice = chosen(options.solver)
+    given = read_project(options.project)
+    problem, lens = color_problem(given, kind, perceptual=options.judge == "oklab", layers=layers)
+    _check_drawings(options, problem)
+    found, cut_off = _search(options, given, problem, lens, choice, measure)
+    remarks = [f"wrote {options.output}", *(["ended early; to resume: the same command"] if cut_off else [])]
     if problem.kept:
         rows = ", ".join(str(k) for k in problem.kept)
         remarks.append(f"rows left bare, as cemented surfaces take no film: {rows}")
-    if pair_map is not None:
-        remarks.append(_draw_map(output, problem, pair_map))
-    if curves is not None:
-        remarks.append(_draw_curves(output, problem, curves))
+    if options.pair_map is not None:
+        remarks.append(_draw_map(options.output, problem, options.pair_map))
+    if options.curves is not None:
+        remarks.append(_draw_curves(options.output, problem, options.curves))
     print_remarks(remarks)
-    if as_json:
-        print_json(_data(problem, found, names))
+    if options.as_json:
+        print_json(_data(problem, found))
     else:
-        _print(problem, found, names)
+        _print(problem, found)
 
 
-def _data(problem: ColorProblem, found: Coatings, names: list[str]) -> dict[str, object]:
+def _check_drawings(options: ColorOptions, problem: ColorProblem) -> None:
+    """Raise an error for a map or curves of what the lens does not have."""
+    from ...design.coatings.colors import mirrors_of
+
+    names = _names(problem)
+    if options.pair_map is not None and options.pair_map not in names:
+        raise ProjectError(
+            f"--map {options.pair_map!r} is no ghost of this lens on one side of its stop, such as {names[0]}"
+        )
+    mirrors = mirrors_of(problem.structure)
+    if options.curves is not None and options.curves not in mirrors:
+        raise ProjectError(
+            f"--curves {options.curves} is no glass surface; the glass surfaces of this lens are rows "
+            f"{', '.join(str(k) for k in mirrors)}"
+        )
+
+
+def _names(problem: ColorProblem) -> list[str]:
+    """Return the names of the ghosts."""
+    return [f"{j}-{i}" for j, i in problem.structure.pairs]
+
+
+def _search(
+    options: ColorOptions, project: Project, problem: ColorProblem, lens: Lens, choice: Choice, measure: ColorMeasure
+) -> tuple[Coatings, bool]:
+    """Search until Ctrl-C and write the lens; return the coatings, and whether it was Ctrl-C."""
+    from ...design.coatings.color_genes import colors_with
+    from ...design.coatings.colors import coated
+    from ...design.solvers.solvers import Limits
+    from ...io.lens.lens_writer import write_lens
+    from ...io.project.project_file import project_text
+
+    time_s = 60.0 if choice.evolves and options.time_s is None else options.time_s
+    inputs = [
+        project_text(project), lens.model_dump_json(), problem.kind, problem.layers, options.judge, options.starts,
+        options.seed,
+    ]  # fmt: skip
+    with (
+        stop_on_interrupt() as asked,
+        partial_work(options.output, inputs, "batch of descents", "batches of descents") as steps,
+    ):
+        found = colors_with(
+            choice, problem, limits=Limits(time_s, None, None, asked), starts=options.starts, seed=options.seed,
+            measure=measure, threads=options.threads, step=steps.step,
+        )  # fmt: skip
+        write_lens(coated(lens, problem.rows, problem.kind, found.values), options.output)
+        steps.unfinished = asked()
+    return found, asked()
+
+
+def _data(problem: ColorProblem, found: Coatings) -> dict[str, object]:
     """Return the result, ready for JSON."""
     from ...design.coatings.colors import perceived_differences
     from ...design.problem.objective import algorithm_2
@@ -128,7 +171,7 @@ def _data(problem: ColorProblem, found: Coatings, names: list[str]) -> dict[str,
         "ghosts": [
             {"ghost": name, "wanted": wanted, "found": got, "oklab_difference": seen}
             for name, wanted, got, seen in zip(
-                names, problem.targets.tolist(), found.colors.tolist(), differences.tolist(), strict=True
+                _names(problem), problem.targets.tolist(), found.colors.tolist(), differences.tolist(), strict=True
             )
         ],
     }
@@ -141,19 +184,19 @@ def _row_data(problem: ColorProblem, value: Floats) -> dict[str, object]:
     return dict(films[0]) if problem.layers == 1 else {"films": films}
 
 
-def _print(problem: ColorProblem, found: Coatings, names: list[str]) -> None:
+def _print(problem: ColorProblem, found: Coatings) -> None:
     from rich.table import Table
 
     from ...design.problem.objective import algorithm_2
 
     fitness = float(algorithm_2(problem.targets, found.colors))
     out = Table(
-        title=f"Algorithm 2: {fitness:.3g} over {len(names)} ghosts",
+        title=f"Algorithm 2: {fitness:.3g} over {len(problem.structure.pairs)} ghosts",
         caption="Red, green, blue as fractions of their sum.",
     )
     for column in ("ghost", "target", "found", "brightness, found / target"):
         out.add_column(column, justify="right", no_wrap=True)
-    for name, wanted, got in zip(names, problem.targets, found.colors, strict=True):
+    for name, wanted, got in zip(_names(problem), problem.targets, found.colors, strict=True):
         out.add_row(name, *(" ".join(f"{part:.3f}" for part in c / c.sum()) for c in (wanted, got)),
                     f"{got.sum() / wanted.sum():.3f}")  # fmt: skip
     console().print(out)
