@@ -18,6 +18,7 @@ from flarewright.plates.settings import PlateSettings
 from flarewright.plates.tracking import follow
 from flarewright.render.render import render
 from flarewright.render.scene.resolve import resolve_project
+from flarewright.typing import Pixels
 
 Row = Callable[..., dict[str, Any]]
 
@@ -53,9 +54,18 @@ def shots(row: Row, repeat: int) -> list[dict[str, Any]]:
     return found
 
 
+def sparse_plate(size_px: tuple[int, int], number: int) -> Pixels:
+    """Return a dark picture with single bright pixels, of which no two touch, shape (height, width, 3)."""
+    width, height = size_px
+    rng, columns = np.random.default_rng(8), width // 3 - 1
+    pixels = np.zeros((height, width, 3), np.float32)
+    places = rng.permutation(columns * (height // 3 - 1))[:number]
+    pixels[3 * (places // columns) + 1, 3 * (places % columns) + 1] = rng.uniform(2.0, 90.0, (number, 3))
+    return pixels
+
+
 def _sources_seconds(mode: str, number: int, repeat: int) -> float:
     """Return the median CPU time to find sources in a plate and to draw their flare on one thread."""
-    width, height = PLATE_PX
     project = Project(
         lens="heliar-tronnier", f_number=8.0, lights=[Light(field_deg=(0.0, 0.0))], camera=Camera(size_px=PLATE_PX),
         quality=Quality(mode=mode),
@@ -63,18 +73,14 @@ def _sources_seconds(mode: str, number: int, repeat: int) -> float:
     settled = resolve_project(project)
     directions = field_map(settled)
     factor = plate_factor(settled, directions)
-    rng = np.random.default_rng(8)
-    pixels = np.zeros((height, width, 3), np.float32)
-    # no two of them touch
-    places = rng.permutation((width // 3 - 1) * (height // 3 - 1))[:number]
-    pixels[3 * (places // (width // 3 - 1)) + 1, 3 * (places % (width // 3 - 1)) + 1] = rng.uniform(
-        2.0, 90.0, (number, 3)
-    )
+    pixels = sparse_plate(PLATE_PX, number)
     seconds = []
     # the first picture loads kernels
     for _ in range(repeat + 1):
         started = time.process_time()
-        limited, _, groups = joined(follow([1], [find_sources(pixels, 1.0)], width), PlateSettings("a.exr").most_lights)
+        limited, _, groups = joined(
+            follow([1], [find_sources(pixels, 1.0)], PLATE_PX[0]), PlateSettings("a.exr").most_lights
+        )
         lights, _ = lights_at(plate_tracks(limited, PLATE_PX, joined=groups), 1, directions, factor, PLATE_PX)
         render(project.replace(lights=lights), threads=1)
         seconds.append(time.process_time() - started)

@@ -6,6 +6,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from benchmarks.shots import sparse_plate
 
 from flarewright import Camera, Light, Project, Quality, render
 from flarewright.errors import ProjectError
@@ -169,10 +170,8 @@ def test_joined_lights_have_ghosts_and_no_image(lens):
 
 def test_two_thousand_sources_keep_their_light_when_they_are_joined():
     """`python -m benchmarks --only shots` measures what they cost."""
-    size, rng = (480, 270), np.random.default_rng(8)
-    pixels = np.zeros((*size[::-1], 3), np.float32)
-    places = rng.permutation(89 * 159)[:2000]
-    pixels[3 * (places // 159) + 1, 3 * (places % 159) + 1] = rng.uniform(2.0, 90.0, (2000, 3))
+    size = (480, 270)
+    pixels = sparse_plate(size, 2000)
     found = find_sources(pixels, 1.0)
     assert len(found) == 2000
     limited, _, groups = joined(follow([1], [found], size[0]), PlateSettings("a.exr").most_lights)

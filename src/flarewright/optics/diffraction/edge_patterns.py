@@ -9,6 +9,7 @@ which differ only in s. The effect of a blade's curvature is computed at a few v
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -138,32 +139,28 @@ def edge_tables(corner: Corner, margin: float = REACH) -> EdgeTables:
     borders do not affect the tables. Tables of curved blades are linear in s between powers of two: the effect of
     curvature is of the order of fringes over radii, and the error is of its square.
     """
-    if (between := _octave(corner)) is not None:
-        low, high, share = between
-        return _between(edge_tables(low, margin), edge_tables(high, margin), share)
+    if (between := _between_nodes(corner, lambda node: edge_tables(node, margin))) is not None:
+        return between
     offset, curvature = (
         (1.0 / corner.scale, corner.curvature * corner.scale) if corner.scale else (_STRAIGHT_OFFSET, 0.0)
     )
     return _tables(corner.gamma, corner.blunt, offset, curvature, margin)
 
 
-def _octave(corner: Corner) -> tuple[Corner, Corner, float] | None:
-    """Return a corner at the powers of two below and above its s, and the part of the higher; None if it is at one."""
+def _between_nodes(corner: Corner, tables_of: Callable[[Corner], EdgeTables]) -> EdgeTables | None:
+    """Interpolate tables, or averages of them, between the powers of two around a corner's s; None if it is at one."""
     if corner.scale == 0.0 or math.frexp(corner.scale)[0] == 0.5:
         return None
-    low = 2.0 ** math.floor(math.log2(corner.scale))
-    return replace(corner, scale=low), replace(corner, scale=2.0 * low), corner.scale / low - 1.0
-
-
-def _between(low: EdgeTables, high: EdgeTables, share: float) -> EdgeTables:
-    """Interpolate tables, also averages, which are linear in the patterns; `share` is the part of `high`."""
+    start = 2.0 ** math.floor(math.log2(corner.scale))
+    low, high = (tables_of(replace(corner, scale=scale)) for scale in (start, 2.0 * start))
+    share = corner.scale / start - 1.0
 
     def mixed(one: Pixels, other: Pixels) -> Pixels:
         return np.float32(1.0 - share) * one + np.float32(share) * other
 
-    border, moment, corner = ((1.0 - share) * a + share * b for a, b in zip(low.excess, high.excess, strict=True))
+    border, moment, at_corner = ((1.0 - share) * a + share * b for a, b in zip(low.excess, high.excess, strict=True))
     return EdgeTables(
-        mixed(low.profile, high.profile), mixed(low.corner, high.corner), low.first, (border, moment, corner)
+        mixed(low.profile, high.profile), mixed(low.corner, high.corner), low.first, (border, moment, at_corner)
     )
 
 
@@ -312,10 +309,9 @@ def _averaged(corner: Corner, spread: float, pixel: float) -> EdgeTables:
 @lru_cache(maxsize=KEPT_BANDS)
 def _band(corner: Corner, spread: float, margin: float) -> EdgeTables:
     """Average tables over a band with a symmetric weight in ln s."""
-    if (between := _octave(corner)) is not None:
-        # two averages serve an octave
-        low, high, share = between
-        return _between(_band(low, spread, margin), _band(high, spread, margin), share)
+    # two averages serve an octave
+    if (between := _between_nodes(corner, lambda node: _band(node, spread, margin))) is not None:
+        return between
     base = edge_tables(corner, margin)
     if spread == 0.0:
         return replace(base, excess=_excess(corner, base))
