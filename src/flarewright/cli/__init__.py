@@ -7,6 +7,7 @@ has its own threads, and idle library threads would spin: a fifth of a core whil
 - `common`: helpers of several commands: option values, output checks, remarks, JSON, progress bars
 - `progress_lines`: `ProgressLines`, progress as lines of JSON
 - `option_record`: `with_options`, commands whose options are the fields of a record
+- `shared_options`: options that mean the same in many commands
 - `option_words`: placeholders of option values in help texts
 - `dataset`, `edit`, `gallery`, `looks`, `warm_up`: single commands
 - `design`, `lens`, `library`, `measure`, `predict`, `project`, `render`: groups of commands

@@ -13,6 +13,7 @@ import typer
 
 from ..errors import FlarewrightError, OutputError
 from .common import picture_size, print_json, print_remark, print_remarks, progress_bar, write_text
+from .shared_options import Json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,7 +33,7 @@ def gallery(
     size: Annotated[
         str, typer.Option(metavar="WxH", help="Size of each picture, in pixels (default: 480x270).")
     ] = "480x270",
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Render every lens and every look of the library, and write a page (index.html) and a contact sheet.
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .common import check_free, check_place, console, print_json, print_remarks, write_text
+from .shared_options import Force, Json
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -25,9 +26,7 @@ SAVE_EPILOG = "Then: flarewright render takumar-50-f1.4 --light -9,5 --look dusk
 _COLUMNS = 32
 
 
-def looks(
-    context: typer.Context, as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False
-) -> None:
+def looks(context: typer.Context, as_json: Json = False) -> None:
     """List the shipped looks, with pictures on a terminal with enough colours."""
     if context.invoked_subcommand is not None:
         return
@@ -68,7 +67,7 @@ def save(
     output: Annotated[Path, typer.Option("-o", "--output", metavar="LOOK.toml", help="The look.")],
     name: Annotated[str | None, typer.Option(help="Name of the look (default: that of the file).")] = None,
     notes: Annotated[str, typer.Option(help="A sentence on its contents.")] = "",
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    force: Force = False,
 ) -> None:
     """Save the look of a project: coatings, iris, f-number, dirt, scatter, colours, overrides."""
     from ..io.project.look_file import look_text

@@ -16,8 +16,8 @@ import typer
 from ...errors import ProjectError
 from ..common import check_place, console, print_json, print_remark, stop_on_interrupt, write_text
 from ..option_record import with_options
+from ..shared_options import Json
 from .checks import check_color_fitness, check_films, check_fitness, check_time
-from .options import Json
 from .partial_work import partial_work
 
 if TYPE_CHECKING:

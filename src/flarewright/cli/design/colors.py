@@ -11,8 +11,9 @@ import typer
 from ...errors import ProjectError
 from ..common import check_place, console, print_json, print_remarks, stop_on_interrupt
 from ..option_record import with_options
+from ..shared_options import Json, Threads
 from .checks import check_color_fitness, check_films, check_time
-from .options import Json, Seed
+from .options import Seed
 from .partial_work import partial_work
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ class ColorOptions:
         typer.Option("--time", help="Seconds (default: 60 for evolutionary solvers, all descents for ours)."),
     ] = None
     seed: Seed = 0
-    threads: Annotated[int | None, typer.Option(min=1, help="Number of threads (default: all cores).")] = None
+    threads: Threads = None
     as_json: Json = False
 
 

@@ -9,13 +9,13 @@ import typer
 
 from ...errors import ProjectError
 from ..common import check_place, chosen_fstop, console, print_remarks
+from ..shared_options import FNumber, KnownLens
 
-Lens = Annotated[str, typer.Argument(metavar="LENS", help="A shipped lens (flarewright lenses) or a lens file.")]
 Output = Annotated[Path, typer.Option("-o", "--output", metavar="LENS.toml", help="The changed lens.")]
 
 
 def resize(
-    lens: Lens,
+    lens: KnownLens,
     output: Output,
     height: Annotated[float, typer.Option(help="Factor on its size, or on the diameter of --all.")],
     ghost: Annotated[str | None, typer.Option(metavar="J-I", help="Ghost to resize.")] = None,
@@ -24,7 +24,7 @@ def resize(
         typer.Option("--all", metavar="WHERE", help="Resize all ghosts bounded by the stop or the entrance instead."),
     ] = None,
     mirror: Annotated[str, typer.Option(help="Mirror whose curvature changes: first (J) or second (I).")] = "first",
-    fstop: Annotated[float | None, typer.Option(help="f-number (default: wide open).")] = None,
+    fstop: FNumber = None,
 ) -> None:
     """Resize one ghost by the radius of a mirror, or all by an opening, and list the effect on all ghosts."""
     check_place(output, ".toml")
@@ -69,7 +69,9 @@ def _mirrors(ghost: str) -> tuple[int, int]:
 
 
 def move_stop(
-    lens: Lens, output: Output, row: Annotated[int, typer.Option(help="Row that becomes the stop, a plane in air.")]
+    lens: KnownLens,
+    output: Output,
+    row: Annotated[int, typer.Option(help="Row that becomes the stop, a plane in air.")],
 ) -> None:
     """Make another row the stop; the old stop is removed."""
     check_place(output, ".toml")

@@ -9,22 +9,23 @@ import typer
 
 from ...errors import ProjectError
 from ..common import chosen_fstop, field_angles, print_json, print_remarks
+from ..shared_options import FNumber, Json, KnownLens
 
 EPILOG = "Example:\n\nflarewright design identify heliar-tronnier --light 5,5 --fstop 16 --brightness"
 
 
 def identify(
-    lens: Annotated[str, typer.Argument(metavar="LENS", help="A shipped lens (flarewright lenses) or a lens file.")],
+    lens: KnownLens,
     light: Annotated[
         list[str], typer.Option(metavar="X,Y", help="Field angles of a measured light, degrees; may be repeated.")
     ],
-    fstop: Annotated[float | None, typer.Option(help="f-number (default: wide open).")] = None,
+    fstop: FNumber = None,
     brightness: Annotated[
         bool, typer.Option("--brightness", help="Irradiances are measured too (bare glass).")
     ] = False,
     stop_known: Annotated[bool, typer.Option("--stop-known", help="The stop's diameter is known.")] = False,
     entrance: Annotated[float, typer.Option(help="Diameter of the entrance, mm.")] = 100.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: Json = False,
 ) -> None:
     """List the numbers of a prescription that ghosts determine, and further measurements for the others."""
     slopes = [hypot(*(tan(radians(angle)) for angle in field_angles(text))) for text in light]

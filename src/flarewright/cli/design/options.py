@@ -50,4 +50,3 @@ MostGhosts = Annotated[
 Surfaces = Annotated[
     int | None, typer.Option(min=2, max=60, help="Number of surfaces without the stop (default: the fewest possible).")
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]

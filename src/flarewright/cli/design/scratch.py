@@ -8,8 +8,9 @@ import typer
 
 from ...errors import OutputError, ProjectError
 from ..common import field_angles, pair
+from ..shared_options import Json
 from .checks import check_fitness, check_time
-from .options import Fitness, Json, Lenses, Output, Searches, Seed, Solver, Surfaces, Threads, Time
+from .options import Fitness, Lenses, Output, Searches, Seed, Solver, Surfaces, Threads, Time
 from .solve import print_search, search
 
 EPILOG = (

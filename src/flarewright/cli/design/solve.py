@@ -12,11 +12,11 @@ import typer
 
 from ...errors import OutputError, ProjectError
 from ..common import print_json, print_remark, print_remarks, stop_on_interrupt
+from ..shared_options import Json
 from .checks import check_fitness, check_time
 from .options import (
     Cluster,
     Fitness,
-    Json,
     Lenses,
     Output,
     Processes,

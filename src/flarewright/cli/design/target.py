@@ -11,6 +11,7 @@ import typer
 from ...errors import ProjectError
 from ...workflow.defaults import WIDTH_MM
 from ..common import check_free, check_place, field_angles, print_json, print_remarks, write_text
+from ..shared_options import Force, Json
 from .checks import check_sensor_width
 from .options import MostGhosts
 
@@ -37,8 +38,8 @@ def target(
         float | None, typer.Option(metavar="MM", help="Focal length of a photograph; a model contains it.")
     ] = None,
     most: MostGhosts = 12,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    force: Force = False,
+    as_json: Json = False,
 ) -> None:
     """Write a project whose targets are the ghosts in a picture; check it before `design solve`."""
     check_place(output, ".toml")

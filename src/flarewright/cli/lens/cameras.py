@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
 from ..common import console, print_json
+from ..shared_options import Json
 
 EPILOG = (
     "Examples:\n\n"
@@ -15,7 +12,7 @@ EPILOG = (
 )
 
 
-def cameras(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False) -> None:
+def cameras(as_json: Json = False) -> None:
     """List the cameras of --sensor with their active area, their pixels and the source of both."""
     from ...io.project.camera_list import camera_formats
 

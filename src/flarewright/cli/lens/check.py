@@ -9,6 +9,7 @@ import typer
 
 from ...errors import FlarewrightError, naming
 from ..common import APERTURES_HELP, FIRST_COLUMN_HELP, aperture_reading, error_data, first_column_reading, print_json
+from ..shared_options import Json
 
 EPILOG = "Example:\n\nflarewright lens check my-lenses/*.lens"
 
@@ -17,7 +18,7 @@ def check(
     files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Lens files or shipped names.")],
     apertures: Annotated[str | None, typer.Option(metavar="KIND", help=APERTURES_HELP)] = None,
     first_column: Annotated[str | None, typer.Option(metavar="KIND", help=FIRST_COLUMN_HELP)] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Check lens files and list repairs; exit code 2 if any is rejected."""
     from ...io.files.door import sentences_for

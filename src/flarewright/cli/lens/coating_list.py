@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from ..common import console, print_json
+from ..shared_options import Json
 
 EPILOG = "Use one with: flarewright render takumar-50-f1.4 --light -9,5 --coating modern-broadband -o flare.exr"
 
 
-def listing(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False) -> None:
+def listing(as_json: Json = False) -> None:
     """List the standard coatings: era, films, mean reflectance over 420 to 680 nm on three glasses, source."""
     from ...model import Standard
     from ...optics.coatings.presets import STANDARD_COATINGS

@@ -9,6 +9,7 @@ import typer
 
 from ...errors import ProjectError
 from ..common import check_place, console, print_json, print_remarks
+from ..shared_options import Json
 
 if TYPE_CHECKING:
     from ...model import Coating
@@ -34,7 +35,7 @@ def plot(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="OUT.svg|png", help="Draw the curves into this file.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Print the reflectance of a coated glass surface in air, by wavelength and angle, and its colour."""
     from ...io.lens.coating_text import parse_coating

@@ -17,6 +17,7 @@ from ..common import (
     first_column_reading,
     print_remarks,
 )
+from ..shared_options import Force
 
 EPILOG = (
     "Examples:\n\nflarewright lens convert old/tessar.lens tessar.toml\n\nflarewright lens convert double-gauss.zmx "
@@ -29,7 +30,7 @@ def convert(
     target: Annotated[Path, typer.Argument(metavar="OUT", help="The file to write: *.toml, .zmx, .csv, .lens, .json.")],
     apertures: Annotated[str | None, typer.Option(metavar="KIND", help=APERTURES_HELP)] = None,
     first_column: Annotated[str | None, typer.Option(metavar="KIND", help=FIRST_COLUMN_HELP)] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    force: Force = False,
 ) -> None:
     """Convert a lens: repaired, completed, with estimates marked; other programs' formats by the suffix."""
     from ...io.files.file_kind import WRITTEN_LENS_SUFFIXES

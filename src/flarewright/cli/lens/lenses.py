@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from ..common import console, focal_text, print_json, print_remarks
+from ..shared_options import Json
 
 EPILOG = "Show one with: flarewright lens show heliar-tronnier --plot heliar.svg"
 
 
-def lenses(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False) -> None:
+def lenses(as_json: Json = False) -> None:
     """List the shipped lenses, then those of your library, with focal length, f-number, field and source."""
     from ...io.lens.library import lens_path, library_names
     from ...io.lens.own.record import as_json as record_json

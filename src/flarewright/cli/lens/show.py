@@ -10,6 +10,7 @@ import typer
 
 from ...errors import ProjectError
 from ..common import check_place, chosen_fstop, console, field_angles, print_json, print_remarks, write_text
+from ..shared_options import FNumber, Json, Zoom
 
 if TYPE_CHECKING:
     from ...model import Lens, Surface
@@ -32,14 +33,12 @@ def show(
     ghost: Annotated[
         str | None, typer.Option(metavar="J-I", help="Draw the rays of this ghost path; sensor-I too.")
     ] = None,
-    zoom: Annotated[
-        str | None, typer.Option(metavar="MM|NAME", help="Focal length, or a position of the lens file.")
-    ] = None,
-    fstop: Annotated[float | None, typer.Option(help="f-number (default: wide open).")] = None,
+    zoom: Zoom = None,
+    fstop: FNumber = None,
     wavelength: Annotated[
         float | None, typer.Option(metavar="NM", help="Wavelength of focal length, pupils and focus (default: 587.56).")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Show a lens: rows, focal length, pupils and sensor; with --plot also a drawing."""
     angles = field_angles(light) if light is not None else None

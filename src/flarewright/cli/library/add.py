@@ -17,6 +17,7 @@ from ..common import (
     print_json,
     print_remarks,
 )
+from ..shared_options import Json
 
 if TYPE_CHECKING:
     from ...workflow.own_library.addition import Addition
@@ -39,7 +40,7 @@ def add(
     ] = None,
     apertures: Annotated[str | None, typer.Option(metavar="KIND", help=APERTURES_HELP)] = None,
     first_column: Annotated[str | None, typer.Option(metavar="KIND", help=FIRST_COLUMN_HELP)] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Add lens files of every known kind to your library; commands then find them by name.
 

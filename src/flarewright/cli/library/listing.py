@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
 from ..common import one_bar, print_json, print_remarks
+from ..shared_options import Json
 from .tables import print_records
 
 EPILOG = "Search them with: flarewright library search zeiss --focal 35-85"
 
 
-def listing(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False) -> None:
+def listing(as_json: Json = False) -> None:
     """List the lenses of your library with focal length, f-number, field, maker and patent."""
     from ...io.lens.own.folder import library_folder
     from ...io.lens.own.record import as_json as record_json

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from ..common import one_bar, print_json, print_remarks
+from ..shared_options import Json
 from .tables import print_records
 
 EPILOG = (
@@ -28,7 +29,7 @@ def search(
     maker: Annotated[str, typer.Option(metavar="NAME", help="Maker, or a part of the name.")] = "",
     patent: Annotated[str, typer.Option(metavar="NUMBER", help="Patent number, or a part of it.")] = "",
     own: Annotated[bool, typer.Option("--own", help="Search your library only, not the shipped lenses.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Search your library and the shipped lenses.
 

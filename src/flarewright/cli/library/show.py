@@ -7,13 +7,14 @@ from typing import Annotated
 import typer
 
 from ..common import focal_text, print_json, print_remarks
+from ..shared_options import Json
 
 EPILOG = "Its rows and pupils: flarewright lens show NAME"
 
 
 def show(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A lens of your library.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Show where a lens of your library came from, what its reader repaired, and where its file is."""
     from ...io.lens.own.record import as_json as record_json

@@ -10,8 +10,9 @@ import typer
 from ...errors import FlarewrightError, OutputError
 from ..common import print_json, print_remarks, write_text
 from ..design.checks import check_sensor_width, check_time
-from ..design.options import Json, Lenses, MostGhosts, Output, Searches, Seed, Surfaces, Threads, Time
+from ..design.options import Lenses, MostGhosts, Output, Searches, Seed, Surfaces, Threads, Time
 from ..design.solve import search
+from ..shared_options import Json
 
 if TYPE_CHECKING:
     from ...design.problem.problem import Problem

@@ -9,6 +9,7 @@ import typer
 
 from ...errors import FlarewrightError
 from ..common import check_place, picture_size, print_json, print_remarks
+from ..shared_options import Json
 
 if TYPE_CHECKING:
     from ...model.measurement.replay_camera import ReplayCamera
@@ -38,7 +39,7 @@ def replay(
         typer.Option("--rec709", help="Convert to linear Rec.709 by the camera's matrix (default: camera colours)."),
     ] = False,
     full: Annotated[bool, typer.Option("--float", help="Write 32 bits per value, unscaled irradiances.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Render a measured flare as layers of an EXR file."""
     check_place(output, ".exr")

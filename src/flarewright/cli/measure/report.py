@@ -9,6 +9,7 @@ import typer
 
 from ...errors import FlarewrightError
 from ..common import check_place, print_json, print_remarks
+from ..shared_options import Json
 
 EPILOG = "Example:\n\nflarewright measure report run"
 
@@ -21,7 +22,7 @@ def report(
     model: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A ghost model (default: DIR/compact.json or DIR/model.json).")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Write a self-contained HTML page with pictures, geometry, ghosts and replay."""
     place = output or folder / "report.html"

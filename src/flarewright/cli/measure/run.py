@@ -12,6 +12,7 @@ import typer
 from ...errors import FlarewrightError
 from ...workflow.measure_provenance import STAGES as AFTER_MERGING
 from ..common import print_json, print_remark, print_remarks, progress_bar
+from ..shared_options import Json
 from .stages import By, CorrectionsFile, Every, NoResidual
 
 if TYPE_CHECKING:
@@ -51,7 +52,6 @@ Threads = Annotated[
 Cluster = Annotated[
     str | None, typer.Option(metavar="WHERE", help="Merge on a Dask cluster: local:N, tcp://HOST:PORT or slurm:FILE.")
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
 def merge_command(

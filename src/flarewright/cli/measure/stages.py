@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..common import print_json, print_remarks, progress_bar
+from ..shared_options import Json, Threads
 
 if TYPE_CHECKING:
     from ...typing import Progress
@@ -49,11 +50,9 @@ NoResidual = Annotated[
         "without the layer residual.",
     ),
 ]
-Threads = Annotated[int | None, typer.Option(min=1, help="Number of threads (default: all cores).")]
 TrackThreads = Annotated[
     int | None, typer.Option(min=1, help="Number of threads, up to 2, forward and backward (default: 2).")
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
 def find(

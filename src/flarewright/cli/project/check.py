@@ -9,6 +9,7 @@ import typer
 
 from ...errors import naming
 from ..common import errors_as_json, print_json, print_remarks
+from ..shared_options import Json
 
 if TYPE_CHECKING:
     from ...model import Project
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 def check(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A project file.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Check a project and its lens, and list all errors; exit code 2 if it cannot be rendered."""
     from ...io.project.project_file import read_project

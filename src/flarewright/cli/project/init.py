@@ -11,6 +11,7 @@ import typer
 from ...errors import ProjectError
 from ..common import check_free, check_place, field_angles, print_remarks, write_text
 from ..render.tracks import compile_places, pixel_place
+from ..shared_options import Force
 
 if TYPE_CHECKING:
     from ...model import Light, Project
@@ -32,7 +33,7 @@ def init(
     light_px: Annotated[
         str | None, typer.Option(metavar="X,Y", help="Instead: its pixel from the top left corner of the picture.")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    force: Force = False,
 ) -> None:
     """Write a project file with every setting, its default and a comment."""
     if light is not None and light_px is not None:

@@ -9,11 +9,12 @@ import typer
 
 from ...errors import ProjectError, naming
 from ..common import errors_as_json, print_json
+from ..shared_options import Json
 
 
 def check(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A scene file.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Check a scene, and list all errors; exit code 2 if it cannot be used."""
     from ...io.files.sentences import count, summary

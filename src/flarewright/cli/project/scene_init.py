@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ..common import check_free, check_place, print_remarks, write_text
+from ..shared_options import Force
 
 EPILOG = "Example:\n\nflarewright scene init -o match.toml\n\nflarewright predict match.toml -o match.html"
 
@@ -16,7 +17,7 @@ def init(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="The scene file, *.toml (default: stdout).")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    force: Force = False,
 ) -> None:
     """Write a scene with two cameras, the sun and a lamp, and a comment on every key."""
     from ...io.project.scene_file import EXAMPLE

@@ -9,6 +9,7 @@ import typer
 
 from ..common import check_free, check_rate, one_bar, print_json, print_remarks
 from ..progress_lines import print_line
+from ..shared_options import Force, Json
 
 if TYPE_CHECKING:
     from ...workflow.films.assembly import FilmResult
@@ -38,8 +39,8 @@ def film(
         float | None,
         typer.Option(metavar="STOPS", help="The same for all frames (default: automatic for a flare, else 0)."),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    force: Force = False,
+    as_json: Json = False,
 ) -> None:
     """Make a film of the finished frames of a shot, all with one exposure.
 

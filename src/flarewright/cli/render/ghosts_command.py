@@ -14,6 +14,7 @@ import typer
 from ...errors import ProjectError
 from ..common import chosen_fstop, console, field_angles, first_run_bar, pair, picture_size, print_json, print_remarks
 from ..option_record import with_options
+from ..shared_options import FNumber, Json, KnownLens, Zoom
 
 if TYPE_CHECKING:
     from ...model import Lens, Project
@@ -30,7 +31,7 @@ EPILOG = (
 class GhostsOptions:
     """The options of `flarewright ghosts` as given."""
 
-    lens: Annotated[str, typer.Argument(metavar="LENS", help="A shipped lens (flarewright lenses) or a lens file.")]
+    lens: KnownLens
     light: Annotated[
         list[str], typer.Option(metavar="X,Y", help="Field angles in degrees, right and up in the picture.")
     ] = field(default_factory=list)
@@ -61,13 +62,11 @@ class GhostsOptions:
             "or a file."
         ),
     ] = "lens"
-    fstop: Annotated[float | None, typer.Option(help="f-number (default: wide open).")] = None
+    fstop: FNumber = None
     paths: Annotated[str, typer.Option(help="Ghost paths: all, or same-side of the stop.")] = "all"
     focus: Annotated[float | None, typer.Option(help="Distance of the plane in focus, mm (default: infinity).")] = None
     sensor_distance: Annotated[float | None, typer.Option(help="Last vertex to sensor, mm.")] = None
-    zoom: Annotated[
-        str | None, typer.Option(metavar="MM|NAME", help="Focal length, or a position of the lens file.")
-    ] = None
+    zoom: Zoom = None
     filter_plate: Annotated[
         str | None, typer.Option("--filter", metavar="GLASS:MM[:GAP]", help="Plane filter in front: N-BK7:2.")
     ] = None
@@ -93,7 +92,7 @@ class GhostsOptions:
     brightest: Annotated[int | None, typer.Option(min=1, help="List only the brightest ones, up to this number.")] = (
         None
     )
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False
+    as_json: Json = False
     sweep: Annotated[
         list[str] | None,
         typer.Option(

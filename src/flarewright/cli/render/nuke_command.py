@@ -9,6 +9,7 @@ import typer
 
 from ...errors import ProjectError
 from ..common import check_free, check_place, check_rate, print_json, print_remarks, write_text
+from ..shared_options import Force, Json
 
 EPILOG = (
     "Examples:\n\nflarewright nuke-script 'flare.####.exr' --plate 'plate.####.exr' -o comp.nk\n\n"
@@ -34,8 +35,8 @@ def nuke_script(
     single_ghosts: Annotated[
         bool, typer.Option("--single-ghosts", help="Grade each single ghost that has a layer.")
     ] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    force: Force = False,
+    as_json: Json = False,
 ) -> None:
     """Write a Nuke script that reads a flare, grades each pass, and adds it to a plate.
 

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from ...shared_options import Json, Threads
+
 
 @dataclass(frozen=True, kw_only=True)
 class GeneralOptions:
@@ -31,7 +33,7 @@ class GeneralOptions:
             metavar="FILE.npz", help="Store rendered pictures, to resume after Ctrl-C or with a changed scene."
         ),
     ] = None
-    threads: Annotated[int | None, typer.Option(min=1, help="Number of threads (default: all cores).")] = None
+    threads: Threads = None
     processes: Annotated[
         int | None, typer.Option(min=1, help="Number of processes that draw pictures (default: 1).")
     ] = None
@@ -39,4 +41,4 @@ class GeneralOptions:
         str | None,
         typer.Option(metavar="WHERE", help="Draw on a Dask cluster: local:N, tcp://HOST:PORT or slurm:FILE."),
     ] = None
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False
+    as_json: Json = False
