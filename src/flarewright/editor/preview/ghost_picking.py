@@ -87,7 +87,7 @@ def see(project: Project, grade: Grade, progress: Progress | None = None) -> Pic
             mode="final", wavelengths=3, paths=quality.paths, tolerance_px=1.0, ringing="off", screen=True
         )
     stage = stage.replace(art=art, quality=quality, output=Output(layers="ghosts", starburst=False))
-    rendering = render_any(stage, progress=progress, limit=True)
+    rendering = render_any(stage, progress=progress)
     width, height = stage.camera.size_px
     across = stage.camera.sensor[0] / width
     ghosts = [
@@ -160,7 +160,7 @@ def single_ghost(project: Project, ghost: str, grade: Grade) -> Pixels:
         # and the residual of a measured flare belongs to no ghost
         quality = quality.replace(wavelengths=3, ringing="off", screen=quality.screen or is_measured(stage))
     stage = stage.replace(art=only, quality=quality, output=Output(layers="passes", starburst=False))
-    layers = [layer for layer in render_any(stage, limit=True).layers if layer.name.startswith("ghosts")]
+    layers = [layer for layer in render_any(stage).layers if layer.name.startswith("ghosts")]
     return _lit(spread_layers(layers, stage.camera.size_px))
 
 

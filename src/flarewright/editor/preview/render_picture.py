@@ -184,7 +184,7 @@ def take(
         light = spread_layers([layer], size)
         seconds = time.perf_counter() - started
         return DrawnPicture(project, "working", light, np.zeros_like(light), seconds, grey=look.grey)
-    rendering = render_any(stage.replace(art=_levelled(stage.art, levels)), progress=progress, limit=True)
+    rendering = render_any(stage.replace(art=_levelled(stage.art, levels)), progress=progress)
     parts = [layer for layer in rendering.layers if layer.name != "beauty"]
     ghosts = spread_layers([layer for layer in parts if layer.name.startswith("ghosts")], size)
     rest = spread_layers([layer for layer in parts if not layer.name.startswith("ghosts")], size)

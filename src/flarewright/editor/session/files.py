@@ -294,7 +294,7 @@ def command_line(file: str, project: Project) -> str:
 def export_picture(project: Project, path: Path, progress: Progress | None = None) -> None:
     """Render a project at its size and quality into an EXR with layers."""
     check_file_space(project)
-    rendering = render_any(project, progress=progress, limit=True)
+    rendering = render_any(project, progress=progress)
     layers, space = in_file_space(rendering.layers, project)
     write_exr(
         path, layers, project.camera.size_px, pixel_type=project.output.pixel_type,
@@ -321,7 +321,7 @@ def export_comp(project: Project, path: Path, progress: Progress | None = None) 
     plate = backplate_shot(project)
     project = project.replace(output=project.output.replace(layers="passes", matte="none"))
     check_comp(project, plate.size_px)
-    rendering = render_any(project, progress=progress, limit=True)
+    rendering = render_any(project, progress=progress)
     metadata = {"version": __version__, "project": project_text(project)}
     write_comp(path, plate, 1, rendering.layers, project, metadata, {})
 

@@ -398,7 +398,7 @@ def read_exr_grey(path: str | PathLike[str], choices: Sequence[Sequence[str]]) -
 
 
 def read_exr_layer(
-    path: str | PathLike[str], layer: str | None, what: str = "an EXR file", *, raw: bool = False
+    path: str | PathLike[str], layer: str | None, what: str = "an EXR file"
 ) -> tuple[Pixels, dict[str, Any]]:
     """Read the colours of a layer of any EXR file within its display window.
 
@@ -410,13 +410,11 @@ def read_exr_layer(
         None: plain channels R, G and B, or a single channel, or Y (grey).
     what : str
         Expected kind of file, for messages.
-    raw : bool
-        Keep values that are infinite or NaN.
 
     Returns
     -------
     pixels : ndarray, shape (H, W, 3), float32
-        0 outside the data window, and for values that are infinite or NaN.
+        0 outside the data window; values may be infinite or NaN.
     header : dict
         Attributes of the layer's part, over those of the first part.
 
@@ -431,9 +429,8 @@ def read_exr_layer(
         values = [np.asarray(part.channels[name].pixels, dtype=np.float64) / _scale(part) for name in names]
         planes = [_over_display(part, plane) for plane in values]
         colours = np.stack(planes if len(planes) == 3 else [planes[0]] * 3, axis=-1)
-        largest = float(np.finfo(np.float32).max)
         with np.errstate(over="ignore"):
-            pixels = (colours if raw else np.where(np.abs(colours) <= largest, colours, 0.0)).astype(np.float32)
+            pixels = colours.astype(np.float32)
         return pixels, {**file.parts[0].header, **part.header}
 
 

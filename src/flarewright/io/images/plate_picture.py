@@ -115,7 +115,7 @@ def read_plate(
 
 
 def _exr(path: Path, layer: str | None, transfer: Transfer | None) -> PlatePicture:
-    pixels, header = read_exr_layer(path, layer, "a plate", raw=True)
+    pixels, header = read_exr_layer(path, layer, "a plate")
     pixels, damaged = _finite(pixels)
     kept = {name: header[name] for name in _KEPT if name in header}
     space, remarks = _primaries(header)

@@ -119,16 +119,14 @@ def _read(path: str, changed_ns: int) -> MeasuredFlare:
     return MeasuredFlare(Path(path).name, model, model.replace(sprites=()))
 
 
-def render_any(project: Project, *, progress: Progress | None = None, limit: bool = False) -> Rendering:
-    """Render a project of a lens or of a measured flare.
+def render_any(project: Project, *, progress: Progress | None = None) -> Rendering:
+    """Render a project of a lens or of a measured flare, a light beyond the measured range at its limit.
 
     Parameters
     ----------
     project : Project
     progress
         As for `render.render.render`.
-    limit : bool
-        As for `render_measured`.
 
     Returns
     -------
@@ -140,7 +138,7 @@ def render_any(project: Project, *, progress: Progress | None = None, limit: boo
         When the project cannot be rendered.
     """
     if is_measured(project):
-        return render_measured(project, progress=progress, limit=limit)
+        return render_measured(project, progress=progress, limit=True)
     return render(project, progress=progress)
 
 
