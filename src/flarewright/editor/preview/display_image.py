@@ -12,7 +12,7 @@ from ...render.image.display import view
 from ...typing import Pixels
 from ..session.view_settings import View
 
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 MIDDLE_GREY = 0.18
 # false colours: upper limits in stops around middle grey, and the colour of each range
 FALSE_COLOURS: tuple[tuple[float, tuple[int, int, int]], ...] = (
@@ -54,7 +54,7 @@ def pixels_of(light: Pixels, exposure_stops: float, look: View, plate: Pixels | 
 
 
 def _false_colour(light: Pixels) -> NDArray[np.uint8]:
-    stops = np.log2(np.maximum(light @ _LUMINANCE, 1e-12) / MIDDLE_GREY)
+    stops = np.log2(np.maximum(light @ LUMINANCE, 1e-12) / MIDDLE_GREY)
     limits = np.array([limit for limit, _ in FALSE_COLOURS[:-1]])
     colours = np.array([colour for _, colour in FALSE_COLOURS], dtype=np.uint8)
     return np.asarray(colours[np.searchsorted(limits, stops)])

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ...measure.replay.measured_project import is_measured, render_any
 from ...model import Art, Layer, Output, Project, Quality, Rule
 from ...typing import Mask, Pixels, Progress
+from .display_image import LUMINANCE
 from .picture import Grade
 from .render_picture import spread_layers, staged
 
@@ -23,7 +24,6 @@ from .render_picture import spread_layers, staged
 SMALL = 0.25
 # relative to a ghost's peak: smaller values are rounding of row sums
 LEFT_OVER = 1e-6
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def single_ghost(project: Project, ghost: str, grade: Grade) -> Pixels:
 
 def _lit(pixels: Pixels) -> Pixels:
     """Return the luminance of a single ghost, with rounding residuals set to 0."""
-    light = np.asarray(pixels @ _LUMINANCE, dtype=np.float32)
+    light = np.asarray(pixels @ LUMINANCE, dtype=np.float32)
     return np.where(light > LEFT_OVER * light.max(initial=0.0), light, np.float32(0.0))
 
 

@@ -12,7 +12,7 @@ from ...io.files.state_folder import state_folder
 from ...typing import Report
 from ..session.reach import reach_of
 from ..session.session import begin
-from .access import EVERYWHERE, LOOPBACK, access_of
+from .access import EVERYWHERE, LOOPBACK, Access, access_of
 from .app import serve
 from .tokens import token_of
 from .workspace import Workspace
@@ -66,13 +66,7 @@ def open_editor(
     session.reach = reach_of([*(folders or [Path.cwd()]), *given, state_folder() / "imports"], session.history)
 
     def ready(found: int) -> None:
-        here, *elsewhere = hosts(host)
-        address = access.address(here, found)
-        report(f"the editor is at {address}  (Ctrl-C ends it)")
-        for name in elsewhere:
-            report(f"from other computers it is at {access.address(name, found)}")
-        if host not in LOOPBACK and not access.origin.startswith("https:"):
-            report("other computers reach the editor unencrypted: use a network that you trust")
+        address = _report_addresses(access, found, report)
         if greeting:
             report(greeting)
         if browser:
@@ -80,6 +74,18 @@ def open_editor(
             threading.Timer(0.3, webbrowser.open, [address]).start()
 
     return serve(Workspace(session, greeting), access, port, ready)
+
+
+def _report_addresses(access: Access, port: int, report: Report) -> str:
+    """Report the addresses of the page; return that for this computer."""
+    here, *elsewhere = hosts(access.host)
+    address = access.address(here, port)
+    report(f"the editor is at {address}  (Ctrl-C ends it)")
+    for name in elsewhere:
+        report(f"from other computers it is at {access.address(name, port)}")
+    if access.host not in LOOPBACK and not access.origin.startswith("https:"):
+        report("other computers reach the editor unencrypted: use a network that you trust")
+    return address
 
 
 def hosts(host: str) -> tuple[str, ...]:

@@ -27,6 +27,9 @@ N_D_TOLERANCE = 0.002
 V_D_TOLERANCE = 0.02
 """... and its V_d differs by at most this fraction."""
 
+F_D_C_UM = (0.4861327, 0.5875618, 0.6562725)
+"""The lines of hydrogen and helium at which makers state indices, micrometres."""
+
 MAKERS = ("SCHOTT", "OHARA", "HOYA", "HIKARI", "CDGM", "SUMITA")
 
 # minerals that prescriptions name directly

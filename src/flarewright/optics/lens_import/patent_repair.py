@@ -18,7 +18,7 @@ from ...model import Coating, Lens, QuarterWave, Row, Stop, Surface
 from ...model.lens.prescription import NO_GLASS
 from ...model.lens.raw_lens import LensReading, RawLens, RawRow
 from ...typing import Floats
-from ..lens.paraxial import FirstOrder, first_order, path_matrices
+from ..lens.paraxial import D_LINE_NM, FirstOrder, first_order, path_matrices
 from ..lens.paths import direct_path
 from ..rays.single_rays import trace_polylines
 from .sequential_import import order_of
@@ -139,7 +139,7 @@ def _check_positive_focal_length(raw: RawLens) -> None:
         elif surfaces:
             surfaces[-1] = surfaces[-1].replace(thickness=surfaces[-1].thickness + row.thickness)
     probe = Lens(name="probe", f_number=8.0, rows=(Stop(), *surfaces))
-    _, system = path_matrices(probe, direct_path(probe), 587.56, sum(row.thickness for row in surfaces[:-1]))
+    _, system = path_matrices(probe, direct_path(probe), D_LINE_NM, sum(row.thickness for row in surfaces[:-1]))
     power = -system[1, 0]
     length = sum(abs(row.thickness) for row in surfaces[:-1])
     if abs(power) * AFOCAL * length < 1.0:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -95,34 +95,16 @@ def search_in_folder(
     OutputError
         When a file cannot be written at the end.
     """
-    from ...design.results.report import search_summary, write_checkpoint, write_folder
-
-    latest, stored = state, state
-
-    def store() -> None:
-        nonlocal stored
-        if (now := latest) is not stored:
-            write_checkpoint(folder, project, now, name)
-            stored = now
-
-    def observer(unit: str) -> Callable[[PoolState], None]:
-        # the project is valid by now, and the search starts
-        make_folder(folder)
-        show = watching.enter_context(display(unit))
-        watching.enter_context(checkpoints(store, report))
-
-        def note(now: PoolState) -> None:
-            nonlocal latest
-            latest = now
-            if sharing is not None and stored is state:
-                # restarts keep their own states from now on; this names their number
-                store()
-            if show is not None:
-                show(now)
-
-        return note
+    from ...design.results.report import search_summary, write_folder
 
     with ExitStack() as watching:
+
+        def observer(unit: str) -> Observer:
+            # the project is valid by now, and the search starts
+            make_folder(folder)
+            show = watching.enter_context(display(unit))
+            return watching.enter_context(_stored(project, folder, state, name, sharing is not None, show, report))
+
         done = search_lenses(
             project, time_s=limits.time_s, state=state, lenses=limits.lenses, searches=limits.searches,
             threads=limits.threads, choice=choice, measure=measure, name=name, report=report, progress=observer,
@@ -132,10 +114,39 @@ def search_in_folder(
     remarks = write_folder(
         folder, project, done.problem, done.state, done.outcomes, done.obstacles, done.conflict, name
     )
-    # where the lenses have a name, the project's lens is a placeholder
+    # a name belongs to lenses that do not come from the project's lens
     about = done.settled.remarks if name is None else ()
     summary = search_summary(done.state, done.outcomes, done.problem, done.obstacles, done.conflict)
     return FolderSearch(done, summary, (*about, *remarks), cut_off)
+
+
+@contextmanager
+def _stored(
+    project: Project, folder: Path, state: PoolState, name: str | None, shared: bool, show: Observer | None,
+    report: Report,
+) -> Iterator[Observer]:  # fmt: skip
+    """Store the newest state every 10 s during the block, which gets the function that notes states."""
+    from ...design.results.report import write_checkpoint
+
+    latest, stored = state, state
+
+    def store() -> None:
+        nonlocal stored
+        if (now := latest) is not stored:
+            write_checkpoint(folder, project, now, name)
+            stored = now
+
+    def note(now: PoolState) -> None:
+        nonlocal latest
+        latest = now
+        if shared and stored is state:
+            # restarts keep their own states from now on; this names their number
+            store()
+        if show is not None:
+            show(now)
+
+    with checkpoints(store, report):
+        yield note
 
 
 def search_to_resume(folder: Path, project: Project, seed: int) -> PoolState:

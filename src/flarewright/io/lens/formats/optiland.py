@@ -25,11 +25,11 @@ from ...files.sentences import shorten
 from ...files.text_file import read_json
 from .. import media
 from ..foreign_file import INFINITE, MOST_SURFACES, json_number, largest_field, lens_errors, sequence_row, whole
+from ..glass_catalogue import F_D_C_UM
 from ..lens_fields import CURVATURE
 from ..medium_names import numbered_medium
 
 _ROUNDED = 1e-6
-_WAVELENGTHS_UM = (0.4861327, 0.5875618, 0.6562725)
 _GEOMETRIES = ("Plane", "StandardGeometry", "EvenAsphere", "OddAsphere", "BiconicGeometry")
 _FREE = {"type": "IdealMaterial", "propagation_model": {"class": "HomogeneousPropagation"}, "index": 1.0, "absorp": 0.0}
 _Findings = list[tuple[int, media.Finding]]
@@ -265,8 +265,7 @@ def optiland_text(lens: Lens, sensor_distance: float, stop_semi_diameter: float)
         },
         "wavelengths": {
             "wavelengths": [
-                {"value": um, "is_primary": um == _WAVELENGTHS_UM[1], "unit": "um", "weight": 1.0}
-                for um in _WAVELENGTHS_UM
+                {"value": um, "is_primary": um == F_D_C_UM[1], "unit": "um", "weight": 1.0} for um in F_D_C_UM
             ],
             "polarization": "ignore",
         },

@@ -14,9 +14,8 @@ from flarewright.errors import GlassError, LensError
 from flarewright.model import Lens, Medium, Stop, Surface
 
 from .. import glass_catalogue
+from ..glass_catalogue import F_D_C_UM
 
-# F, d and C line
-_WAVELENGTHS_UM = (0.4861327, 0.5875618, 0.6562725)
 _SAME_INDEX = 1e-6
 _SAME_ABBE = 0.01
 # aspheric terms from r^4 on: Zemax's even asphere has eight, from r^2 to r^16
@@ -76,9 +75,9 @@ def zmx_text(name: str, states: Sequence[LensState]) -> tuple[str, tuple[str, ..
         "VERS 140124 258 36214", "MODE SEQ", f"NAME {' '.join(name.split())}",
         *(f"NOTE 0 {' '.join(line.split())}" for line in (lens.source, *lens.notes.splitlines()) if line.strip()),
         "UNIT MM X W X CM MR CPMM", f"FNUM {lens.f_number!r} 0", *([f"GCAT {' '.join(makers)}"] if makers else []),
-        f"FTYP 0 0 {len(fields)} {len(_WAVELENGTHS_UM)} 0 0 0", f"XFLN {' '.join('0' for _ in fields)}",
+        f"FTYP 0 0 {len(fields)} {len(F_D_C_UM)} 0 0 0", f"XFLN {' '.join('0' for _ in fields)}",
         f"YFLN {' '.join(map(repr, fields))}",
-        *(f"WAVM {k} {um!r} 1" for k, um in enumerate(_WAVELENGTHS_UM, 1)), "PWAV 2",
+        *(f"WAVM {k} {um!r} 1" for k, um in enumerate(F_D_C_UM, 1)), "PWAV 2",
         "SURF 0", "  TYPE STANDARD", "  CURV 0.0 0 0 0 0 \"\"",
         f"  DISZ {'INFINITY' if lens.focus_distance is None else repr(lens.focus_distance)}", '  DIAM 0 0 0 0 1 ""',
     ]  # fmt: skip
