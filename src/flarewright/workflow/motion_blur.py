@@ -13,6 +13,7 @@ from ..measure.replay.measured_project import is_measured
 from ..model import Layer, Project
 from ..model.matte import GhostMatte
 from ..optics.lens.paths import direct_path, ghost_paths
+from ..render.image.compose import add_layer
 from ..render.image.ghost_ranking import GhostRanking
 from ..render.scene.opening import make_opening
 from ..render.scene.paraxial_place import ghost_frame
@@ -191,10 +192,7 @@ def mean_layers(frames: Iterable[Sequence[Layer]], size_px: tuple[int, int], num
         for layer in layers:
             total = sums.setdefault(layer.name, np.zeros((height, width, 3)))
             kept.setdefault(layer.name, layer)
-            x, y, w, h = layer.window
-            left, top, right, bottom = max(x, 0), max(y, 0), min(x + w, width), min(y + h, height)
-            if left < right and top < bottom:
-                total[top:bottom, left:right] += layer.pixels[top - y : bottom - y, left - x : right - x]
+            add_layer(total, layer)
     window = (0, 0, width, height)
     return tuple(
         # the variance of a mean of independent values

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
 from ..common import check_free, check_rate, one_bar, print_json, print_remarks
 from ..progress_lines import print_line
 from ..shared_options import Force, Json
+from .preview import check_look
 
 if TYPE_CHECKING:
     from ...workflow.films.assembly import FilmResult
@@ -48,9 +49,8 @@ def film(
     """
     check_rate(fps)
     from ...workflow.films.assembly import assemble_film
-    from ...workflow.films.look import check_look
 
-    check_look(view, exposure)
+    check_film_look(view, exposure)
     check_free(output, force)
 
     with one_bar("film") as progress:
@@ -70,6 +70,13 @@ def film(
         print_json({**film_data(found), "remarks": list(found.remarks)})
     else:
         print_remarks([film_words(found)])
+
+
+def check_film_look(view: str | None, exposure: float | None) -> None:
+    """Raise ProjectError for a view or an exposure that a film cannot have."""
+    from ...workflow.films.look import FilmView
+
+    check_look(view, exposure, get_args(FilmView))
 
 
 def film_line(frame: int, done: int, of: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -55,15 +56,7 @@ def preview_look(options: RenderOptions) -> PreviewLook | None:
         if flags:
             raise ProjectError(f"{flags[0]} is for the PNG and --no-png omits it; keep one")
         return None
-    if view is not None and view not in get_args(Transform):
-        raise ProjectError(f"--view {view!r} is unknown; choose {', '.join(get_args(Transform))}")
-    if view == "aces":
-        from ...render.image.aces_view import aces_available
-
-        if not aces_available():
-            raise ProjectError("--view aces needs opencolorio: pip install 'flarewright[color]', or choose filmic")
-    if exposure is not None and not -100.0 <= exposure <= 100.0:
-        raise ProjectError(f"--exposure {exposure:g} is out of range; choose between -100 and 100 stops")
+    check_look(view, exposure, get_args(Transform))
     ways = [flag for flag in ("--exposure", "--ev", "--shutter") if flag in flags]
     if len(ways) > 1:
         raise ProjectError(f"{' and '.join(ways)} each set the exposure of the PNG; keep one")
@@ -79,6 +72,29 @@ def preview_look(options: RenderOptions) -> PreviewLook | None:
         iso=iso or 100.0,
         lux=SUN_LUX if lux is None or lux == "sun" else _number("--lux", lux, "a number or sun", 1e-6, 1e9),
     )  # fmt: skip
+
+
+def check_look(view: str | None, exposure: float | None, known: Sequence[str]) -> None:
+    """Raise ProjectError for a view that does not exist or needs a package, and for an exposure out of range.
+
+    Parameters
+    ----------
+    view : str or None
+        Of `--view`.
+    exposure : float or None
+        Of `--exposure`, stops.
+    known : sequence of str
+        Views.
+    """
+    if view is not None and view not in known:
+        raise ProjectError(f"--view {view!r} is unknown; choose {', '.join(known)}")
+    if view == "aces":
+        from ...render.image.aces_view import aces_available
+
+        if not aces_available():
+            raise ProjectError("--view aces needs opencolorio: pip install 'flarewright[color]', or choose filmic")
+    if exposure is not None and not -100.0 <= exposure <= 100.0:
+        raise ProjectError(f"--exposure {exposure:g} is out of range; choose between -100 and 100 stops")
 
 
 def check_exposure(look: PreviewLook | None, project: Project) -> None:

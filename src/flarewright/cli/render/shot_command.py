@@ -15,7 +15,7 @@ from ..common import first_run_bar, print_json, print_remark, print_remarks, pro
 from ..option_record import with_options
 from ..progress_lines import ProgressLines, print_line
 from .command import keep_inputs, project_of_options
-from .film_command import film_data, film_line, film_words
+from .film_command import check_film_look, film_data, film_line, film_words
 from .options.record import RenderOptions
 from .options.shot import ShotOptions
 
@@ -122,12 +122,10 @@ def _print(result: ShotResult, seconds: float) -> None:
 
 def _check_movie(options: ShotOptions) -> None:
     """Check the flags of the film."""
-    from ...workflow.films.look import check_look
-
     for flag, value in (("--view", options.view), ("--exposure", options.exposure)):
         if value is not None and options.movie is None:
             raise ProjectError(f"{flag} is for the film, and none is made; add --movie FILM.mp4, or omit {flag}")
-    check_look(options.view, options.exposure)
+    check_film_look(options.view, options.exposure)
 
 
 def _parts(text: str | None) -> Literal["multi", "single"]:

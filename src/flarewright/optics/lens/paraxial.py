@@ -117,21 +117,21 @@ def path_matrices(
     total : ndarray, shape (2, 2)
         First vertex to sensor: Ms Ma.
     """
-    curvature = curvature_across(lens) if across else None
-    if curvature is None:
-        curvature = np.array([row.curvature if isinstance(row, Surface) else 0.0 for row in lens.rows])
-    return _along(lens, path, curvature, wavelength_nm, sensor_z)
-
-
-def _along(
-    lens: Lens, path: LightPath, curvature: Floats, wavelength_nm: float, sensor_z: float
-) -> tuple[list[Matrix], Matrix]:
+    curvature = _curvatures(lens, across)
     to_stop = np.empty((path.stop_crossings, 2, 2))
     n, z = gap_indices(lens, wavelength_nm), vertex_positions(lens)
     if path.sensor:
         curvature, z, n = np.append(curvature, 0.0), np.append(z, sensor_z), np.append(n, 1.0)
     total = _path_matrices(path.rows, path.actions, curvature, z, n, sensor_z, to_stop)
     return list(to_stop), np.array(total).reshape(2, 2)
+
+
+def _curvatures(lens: Lens, across: bool) -> Floats:
+    """Return the curvatures of the rows in the y-z plane, or across it."""
+    curvature = curvature_across(lens) if across else None
+    if curvature is None:
+        return np.array([row.curvature if isinstance(row, Surface) else 0.0 for row in lens.rows])
+    return curvature
 
 
 def flare_matrices(lens: Lens, path: LightPath, wavelength_nm: float, sensor_z: float) -> tuple[Matrix, Matrix]:
@@ -217,10 +217,7 @@ def _meridian_x(lens: Lens, wavelength_nm: float, last: float) -> dict[str, floa
 
 def _is_afocal(lens: Lens, slope: float, wavelength_nm: float, *, across: bool = False) -> bool:
     """Whether a lens has no power, given the slope behind it of a ray that enters at height 1."""
-    curvature = curvature_across(lens) if across else None
-    if curvature is None:
-        curvature = np.array([row.curvature if isinstance(row, Surface) else 0.0 for row in lens.rows])
-    powers = np.diff(gap_indices(lens, wavelength_nm)) * curvature
+    powers = np.diff(gap_indices(lens, wavelength_nm)) * _curvatures(lens, across)
     return abs(slope) <= AFOCAL * float(np.abs(powers).sum())
 
 

@@ -4,7 +4,7 @@ Modules:
 
 - `canvas`: `Canvas`, `merge`, `to_layer`, `lit_window`: planes of flux at several resolutions
 - `partial_picture`: `PartialPicture`, `KeptSteps`: canvases in files, from which an interrupted render resumes
-- `compose`: `beauty`: the sum of layers
+- `compose`: `beauty`, `add_layer`: the sum of layers
 - `ghost_ranking`: `GhostRanking`, `ghost_matte`: the brightest ghosts of each pixel
 - `shown_layer`: `ShownLayer`: a layer that can show itself in a notebook
 - `gamut`: `apply_gamut`, `compressed`: colours outside the primaries of a file

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import FlarewrightError
 from ...model.layer import Layer
@@ -51,8 +53,21 @@ def beauty(layers: Sequence[Layer], size_px: tuple[int, int] | None = None) -> L
     else:
         total = np.zeros((height, width, 3), np.float32)
     for layer in rest:
-        x, y, w, h = layer.window
-        left, top, right, bottom = max(x, 0), max(y, 0), min(x + w, width), min(y + h, height)
-        if left < right and top < bottom:
-            total[top:bottom, left:right] += layer.pixels[top - y : bottom - y, left - x : right - x]
+        add_layer(total, layer)
     return Layer("beauty", total, whole)
+
+
+def add_layer(total: NDArray[np.floating[Any]], layer: Layer) -> None:
+    """Add a layer, inside its window, to a picture.
+
+    Parameters
+    ----------
+    total : ndarray, shape (H, W, 3)
+        Modified.
+    layer : Layer
+        Parts of its window outside the picture are ignored.
+    """
+    x, y, w, h = layer.window
+    left, top, right, bottom = max(x, 0), max(y, 0), min(x + w, total.shape[1]), min(y + h, total.shape[0])
+    if left < right and top < bottom:
+        total[top:bottom, left:right] += layer.pixels[top - y : bottom - y, left - x : right - x]

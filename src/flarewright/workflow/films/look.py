@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,19 +43,6 @@ class FilmLook:
     stops: float
     words: str
     remarks: tuple[str, ...] = ()
-
-
-def check_look(name: str | None, exposure_stops: float | None) -> None:
-    """Raise ProjectError for a view that does not exist or needs a package, and for an exposure out of range."""
-    if name is not None and name not in get_args(FilmView):
-        raise ProjectError(f"--view {name!r} is unknown; choose {', '.join(get_args(FilmView))}")
-    if name == "aces":
-        from ...render.image.aces_view import aces_available
-
-        if not aces_available():
-            raise ProjectError("--view aces needs opencolorio: pip install 'flarewright[color]', or choose filmic")
-    if exposure_stops is not None and not -100.0 <= exposure_stops <= 100.0:
-        raise ProjectError(f"--exposure {exposure_stops:g} is out of range; choose between -100 and 100 stops")
 
 
 def film_look(

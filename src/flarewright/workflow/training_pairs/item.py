@@ -125,8 +125,7 @@ def item_record(plan: DatasetPlan, index: int, split: str) -> bytes | None:
         return _fragment_record(plan, index)
     folder = Path(plan.folder)
     line = _read(folder / name_of(plan.spec, split, index, "parameters"))
-    record = None if line is None else read_record(line)
-    if line is None or record is None or record.get("digest") != plan.digest:
+    if (record := _own_record(plan, line)) is None:
         return None
     return line if all(_has_size(folder, about) for about in record["files"].values()) else None
 
@@ -140,11 +139,16 @@ def _fragment_record(plan: DatasetPlan, index: int) -> bytes | None:
     except ValueError:
         return None
     line = found.pop(name_of(plan.spec, "", index, "parameters"), None)
-    record = None if line is None else read_record(line)
-    if line is None or record is None or record.get("digest") != plan.digest:
+    if (record := _own_record(plan, line)) is None:
         return None
     sizes = {about["file"]: about["bytes"] for about in record["files"].values()}
     return line if {name: len(content) for name, content in found.items()} == sizes else None
+
+
+def _own_record(plan: DatasetPlan, line: bytes | None) -> dict[str, Any] | None:
+    """Return the record in a line; None without one, or for an item of another specification."""
+    record = None if line is None else read_record(line)
+    return record if record is not None and record.get("digest") == plan.digest else None
 
 
 def _read(path: Path) -> bytes | None:
