@@ -23,7 +23,7 @@ from ..common import (
 )
 from ..option_record import with_options
 from .options.record import PredictOptions
-from .scene import SceneRequest, is_scene, predict_scene
+from .scene import SearchRoom, is_scene, predict_scene
 
 if TYPE_CHECKING:
     from ...model import Project
@@ -67,28 +67,16 @@ def predict(options: PredictOptions) -> None:
     unnamed = repr(replace(options, threads=None, processes=None, cluster=None))
     if is_scene(options.subject):
         _refuse(_given(options, _OF_LENS + _OF_MODEL + _OF_CURVES), "a scene", "the scene file sets it")
-        request = SceneRequest(
-            options.output, options.quality or "final", options.near,
-            5.0 if options.radius is None else options.radius, options.height or 0.0, options.shortest_shot or 0.0,
-            options.glare, options.threads, options.as_json, options.cache, unnamed, options.processes, options.cluster,
-        )  # fmt: skip
-        predict_scene(Path(options.subject), _checked(request, options.radius or options.height))
+        predict_scene(Path(options.subject), options, _search_room(options), unnamed)
         return
     _refuse(_given(options, _OF_SCENE), "a lens or a measured flare", "give a scene file")
-    setting = _setting(options.illuminance, options.luminance)
-    wanted = _wanted(
-        options.to, options.roll, options.tolerance, options.samples, options.check, options.bins, setting,
-        options.output,
-    )  # fmt: skip
+    wanted = _wanted(options)
     from ...io.measurement.ghost_model_file import is_ghost_model_file
     from ...workflow.flare_pictures import pictures_elsewhere
 
     size, folder = _sensor(options.sensor), Path() if options.output is None else options.output.parent
     measured = is_ghost_model_file(options.subject)
-    with pictures_elsewhere(
-        options.cluster, options.processes, options.threads, folder,
-        print_remark,
-    ) as spread:  # fmt: skip
+    with pictures_elsewhere(options.cluster, options.processes, options.threads, folder, print_remark) as spread:
         project, flares = (None, _of_model(options, size)) if measured else _of_lens(options, size or (36.0, 24.0))
         _curves(flares, wanted, project if options.glare else None, options, unnamed, spread)
 
@@ -129,10 +117,7 @@ def _of_lens(options: PredictOptions, size: tuple[float, float]) -> tuple[Projec
 
     _refuse(_given(options, ("unit_per_cd_m2",)), "a lens", "it follows from the glass")
     _refuse(_given(options, ("count", "around_light")), "a lens", "the light's image is separate from the flare")
-    project = _project(
-        options.subject, options.fstop, options.coating, options.zoom, options.focus, size, options.spectrum,
-        options.light_diameter,
-    )  # fmt: skip
+    project = _project(options, size)
     compile_for_render(shown_project(project), options.threads)
     return project, lens_flares(project, options.quality or "final", options.threads)
 
@@ -180,34 +165,39 @@ def _refuse(flags: dict[str, Any], what: str, why: str) -> None:
             raise ProjectError(f"{flag} has no meaning for {what}: {why}; omit {flag}")
 
 
-def _checked(request: SceneRequest, searched: float | None) -> SceneRequest:
+def _search_room(options: PredictOptions) -> SearchRoom:
+    """Return where a scene is searched and how its cameras are switched, checked."""
+    room = SearchRoom(
+        5.0 if options.radius is None else options.radius, options.height or 0.0, options.shortest_shot or 0.0
+    )
     for flag, value, least in (
-        ("--radius", request.radius_m, 1e-6), ("--height", request.height_m, 0.0),
-        ("--shortest-shot", request.shortest_shot_s, 0.0),
+        ("--radius", room.radius_m, 1e-6), ("--height", room.height_m, 0.0),
+        ("--shortest-shot", room.shortest_shot_s, 0.0),
     ):  # fmt: skip
         if not least <= value < 1e6:
             raise ProjectError(f"{flag} {value:g} is out of range; give a number of {'s' if 'shot' in flag else 'm'} "
                                f"{'of at least' if least == 0.0 else 'above'} 0")  # fmt: skip
-    if request.near is None and searched:
+    if options.near is None and (options.radius or options.height):
         raise ProjectError("--radius and --height limit the search for a position; add --near CAMERA")
-    return request
+    return room
 
 
-def _wanted(
-    to: float | None, roll: float | None, tolerance: float | None, samples: int | None, check: int | None,
-    bins: int | None, setting: Setting, output: Path | None,
-) -> Wanted:  # fmt: skip
+def _wanted(options: PredictOptions) -> Wanted:
     from ...predict.occurrence import Wanted
 
+    setting, to, roll, tolerance = _setting(options), options.to, options.roll, options.tolerance
     if roll is not None and not (math.isfinite(roll) and abs(roll) <= 360.0):
         raise ProjectError(f"--roll {roll:g} is no direction; choose degrees between -360 and 360")
     if tolerance is not None and not 1e-4 <= tolerance <= 1.0:
         raise ProjectError(f"--tolerance {tolerance:g} is out of range; choose between 0.0001 and 1")
     if to is not None and not (math.isfinite(to) and to > 0.0):
         raise ProjectError(f"--to {to:g} is no constellation; choose degrees above 0")
-    given = {"to_deg": to, "roll_deg": roll, "tolerance": tolerance, "samples": samples, "checks": check, "bins": bins}
+    given = {
+        "to_deg": to, "roll_deg": roll, "tolerance": tolerance, "samples": options.samples, "checks": options.check,
+        "bins": options.bins,
+    }  # fmt: skip
     known: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    return Wanted(setting=setting, pictures=output is not None, **known)
+    return Wanted(setting=setting, pictures=options.output is not None, **known)
 
 
 def _sensor(text: str | None) -> tuple[float, float] | None:
@@ -222,24 +212,21 @@ def _sensor(text: str | None) -> tuple[float, float] | None:
         raise ProjectError(f"--sensor {text!r}: {error}") from None
 
 
-def _setting(illuminance: float | None, luminance: str | None) -> Setting:
+def _setting(options: PredictOptions) -> Setting:
     from ...predict.occurrence import Setting
 
-    illuminance = 1e5 if illuminance is None else illuminance
+    illuminance = 1e5 if options.illuminance is None else options.illuminance
     if not 0.0 < illuminance <= 1e9:
         raise ProjectError(f"--illuminance {illuminance:g} is no illuminance; give lux above 0, 1e5 for the sun")
-    if luminance is None:
+    if options.luminance is None:
         return Setting(illuminance)
-    low, high = pair(luminance, "--luminance", "50,5000 (cd/m², darkest and brightest)")
+    low, high = pair(options.luminance, "--luminance", "50,5000 (cd/m², darkest and brightest)")
     if not 0.0 <= low < high:
-        raise ProjectError(f"--luminance {luminance!r}: give the darkest first, at least 0, then the brightest")
+        raise ProjectError(f"--luminance {options.luminance!r}: give the darkest first, at least 0, then the brightest")
     return Setting(illuminance, (low, high))
 
 
-def _project(
-    lens: str, fstop: float | None, coating: str | None, zoom: str | None, focus: float | None,
-    sensor: tuple[float, float], spectrum: str | None, light_diameter: float | None,
-) -> Project:  # fmt: skip
+def _project(options: PredictOptions, sensor: tuple[float, float]) -> Project:
     """Return a project of the flags, with its light on the axis."""
     from ...io.lens.coating_text import parse_coating_choice
     from ...io.project.spectrum_text import parse_spectrum
@@ -248,12 +235,13 @@ def _project(
     width, height = sensor
     size_px = (SHOWN_PX, round(SHOWN_PX * height / width))
     light = {
-        "field_deg": (0.0, 0.0), "spectrum": parse_spectrum(spectrum or "d65"), "diameter_deg": light_diameter or 0.0
+        "field_deg": (0.0, 0.0), "spectrum": parse_spectrum(options.spectrum or "d65"),
+        "diameter_deg": options.light_diameter or 0.0,
     }  # fmt: skip
     return project_of({
-        "lens": lens, "f_number": fstop, "coating": parse_coating_choice(coating or "lens"), "zoom": zoom,
-        "lights": (light,),
-        "camera": {"size_px": size_px, "sensor_mm": (width, height), "focus_distance": focus},
+        "lens": options.subject, "f_number": options.fstop, "coating": parse_coating_choice(options.coating or "lens"),
+        "zoom": options.zoom, "lights": (light,),
+        "camera": {"size_px": size_px, "sensor_mm": (width, height), "focus_distance": options.focus},
     })  # fmt: skip
 
 

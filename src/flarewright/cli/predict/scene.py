@@ -19,26 +19,16 @@ if TYPE_CHECKING:
     from ...predict.switching import Shot
     from ...predict.worst import Worst
     from ...render.scattering.veiling_glare import VeilingGlare
+    from .options.record import PredictOptions
 
 
 @dataclass(frozen=True)
-class SceneRequest:
-    """Options for a scene."""
+class SearchRoom:
+    """Where another position of a camera is searched, and the shortest time between two switches of cameras."""
 
-    output: Path | None
-    quality: str
-    near: str | None
     radius_m: float
     height_m: float
     shortest_shot_s: float
-    glare: bool
-    threads: int | None
-    as_json: bool
-    cache: Path | None = None
-    unnamed: str = ""
-    """Text that identifies the command, for the place of its partial work without an output."""
-    processes: int | None = None
-    cluster: str | None = None
 
 
 def is_scene(subject: str) -> bool:
@@ -56,13 +46,16 @@ def is_scene(subject: str) -> bool:
     return "rows" not in data and bool({"cameras", "lights"} & data.keys()) and "lens" not in data
 
 
-def predict_scene(path: Path, request: SceneRequest) -> None:
+def predict_scene(path: Path, options: PredictOptions, room: SearchRoom, unnamed: str) -> None:
     """Predict a scene and print its ranking.
 
     Parameters
     ----------
     path : Path
-    request : SceneRequest
+    options : PredictOptions
+    room : SearchRoom
+    unnamed : str
+        Text that identifies the command, for the place of its partial work without an output.
     """
     from ...io.project.scene_file import read_scene
     from ...predict.plan import plan_scene, ranking
@@ -73,47 +66,44 @@ def predict_scene(path: Path, request: SceneRequest) -> None:
 
     scene = read_scene(path)
     _refuse_dark(path, scene)
-    camera = None if request.near is None else _camera_number(scene, request.near)
-    maker = partial(_named, quality=request.quality, threads=request.threads)
-    folder = Path() if request.output is None else request.output.parent
+    camera = None if options.near is None else _camera_number(scene, options.near)
+    maker = partial(_named, quality=options.quality or "final", threads=options.threads)
+    folder = Path() if options.output is None else options.output.parent
     # pictures are kept until the page is written
     with (
-        pictures_elsewhere(
-            request.cluster, request.processes, request.threads, folder,
-            print_remark,
-        ) as spread,
-        remembered(request.cache, request.output, request.unnamed) as memory,
-    ):  # fmt: skip
+        pictures_elsewhere(options.cluster, options.processes, options.threads, folder, print_remark) as spread,
+        remembered(options.cache, options.output, unnamed) as memory,
+    ):
         with naming(path):
-            _compile(scene, request.threads)
+            _compile(scene, options.threads)
         with progress_bar() as reported:
             with naming(path):
                 plan = plan_scene(scene, partial(maker, shown=False), reported, memory, spread)
             ranked = ranking(plan)
             found = None
             if camera is not None:
-                found = best_position(plan, camera, request.radius_m, request.height_m, reported("position"), spread)
+                found = best_position(plan, camera, room.radius_m, room.height_m, reported("position"), spread)
             worst: list[Worst] = []
-            if request.output is not None:
+            if options.output is not None:
                 worst = render_worst(plan, ranked, partial(maker, shown=True), reported("pictures"), memory, spread)
-        shots = _shots(plan, request.shortest_shot_s)
-        glare = [_glare(plan, c, request.threads) if request.glare else None for c in range(len(scene.cameras))]
+        shots = _shots(plan, room.shortest_shot_s)
+        glare = [_glare(plan, c, options.threads) if options.glare else None for c in range(len(scene.cameras))]
         print_remarks(plan.remarks)
-        if request.output is not None:
+        if options.output is not None:
             from ...predict.scene_page import scene_page
             from ..common import write_text
 
-            write_text(request.output, scene_page(plan, ranked, shots, found, worst))
-    if request.as_json:
+            write_text(options.output, scene_page(plan, ranked, shots, found, worst))
+    if options.as_json:
         data = scene_data(plan, ranked, shots, found, worst, glare)
-        print_json({**data, **({} if request.output is None else {"report": str(request.output)})})
+        print_json({**data, **({} if options.output is None else {"report": str(options.output)})})
         return
     _print(plan, ranked, shots, found)
     for one, veil in zip(scene.cameras, glare, strict=True):
         if veil is not None:
             console().print(f"{one.name}: veiling glare index {veil.index:.3%} at {veil.wavelength_nm:g} nm")
-    if request.output is not None:
-        print_remarks([f"wrote {request.output}"])
+    if options.output is not None:
+        print_remarks([f"wrote {options.output}"])
 
 
 def _camera_number(scene: Scene, name: str) -> int:
