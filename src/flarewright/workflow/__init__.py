@@ -3,7 +3,7 @@
 The command line and other front ends call these functions; nothing here prints.
 
 - `measure_run`: `run_stages` runs the stages of a measurement in a run's folder (`StageResult`)
-- `measure_merge`: `merge_on` merges photographs, on this machine or on a cluster
+- `measure_merge`: `merge_photographs` merges a list of photographs, on this machine or on a cluster
 - `measure_provenance`: `STAGES`; records from which model the file of a later stage was made
 - `searches`: `search_lenses` searches lenses for a project's targets, `search_in_folder` writes them and resumes
 - `flare_curves`: `flare_curves` predicts a lens' flare over the constellation
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from .lens_flares import scene_flare as scene_flare
     from .light_places import lights_at_pixels as lights_at_pixels
     from .light_places import with_tracks as with_tracks
+    from .measure_merge import merge_photographs as merge_photographs
     from .measure_provenance import STAGES as STAGES
     from .measure_run import StageResult as StageResult
     from .measure_run import run_stages as run_stages
@@ -62,6 +63,7 @@ __all__, __getattr__, __dir__ = lazy_names(
         ".flare_curves": ("flare_curves",),
         ".lens_flares": ("camera_project", "lens_flares", "scene_flare"),
         ".light_places": ("lights_at_pixels", "with_tracks"),
+        ".measure_merge": ("merge_photographs",),
         ".measure_provenance": ("STAGES",),
         ".measure_run": ("StageResult", "run_stages"),
         ".project_files": ("open_project_files",),

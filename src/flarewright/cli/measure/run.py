@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,7 +16,7 @@ from .stages import By, CorrectionsFile, Every, NoResidual
 
 if TYPE_CHECKING:
     from ...measure.merging.settings import MergeSettings
-    from ...model.measurement.capture import CameraNoise, MergedRun
+    from ...model.measurement.capture import MergedRun
 
 MERGE_EPILOG = (
     "Examples:\n\nflarewright measure merge captures.csv -o run\n\n"
@@ -179,37 +178,16 @@ def _merge(
     every: int = 1,
 ) -> MergedRun:
     """Merge exposures; `every` n-th frame is what later stages use, which is checked first."""
-    from ...io.measurement.captures import captures_folder, parse_rule, read_capture_list
-    from ...measure.core.frame_reading import check_every
-    from ...measure.pipeline.merge_stage import check_same_run, exposure_groups
-    from ...measure.report.overview import write_overview
-    from ...workflow.measure_merge import merge_on
+    from ...io.measurement.captures import parse_rule
+    from ...workflow.measure_merge import merge_photographs
 
     _check_there(captures)
     rule = None if angles is None else parse_rule(angles)
-    known = _camera(captures, camera)
-    check_same_run(output)
     with progress_bar() as begin:
-        started = begin("merge")
-        started(0.0, "reading the list")
-        listed, remarks = read_capture_list(captures, rule)
-        rolls = Counter(group[0].roll_deg for group in exposure_groups(listed))
-        check_every(list(rolls.values()), every, captures)
-        merged = merge_on(
-            cluster,
-            listed,
-            captures_folder(captures),
-            output,
-            camera=known,
-            settings=settings,
-            threads=threads,
-            progress=started,
-            remarks=remarks,
-            report=print_remark,
-            announce=print_remark,
-        )
-        write_overview(output, merged)
-    return merged
+        return merge_photographs(
+            captures, output, rule=rule, camera=camera, settings=settings, every=every, threads=threads,
+            cluster=cluster, progress=begin("merge"), report=print_remark,
+        )  # fmt: skip
 
 
 def _check_way(by: str, chosen: Sequence[str]) -> None:
@@ -229,15 +207,6 @@ def _check_way(by: str, chosen: Sequence[str]) -> None:
 def _check_there(captures: Path) -> None:
     if not captures.exists():
         raise FlarewrightError(f"{captures} does not exist: check the path and the spelling")
-
-
-def _camera(captures: Path, camera: Path | None) -> CameraNoise | None:
-    from ...io.measurement.captures import captures_folder, read_camera
-
-    if camera is None:
-        beside = captures_folder(captures) / "camera.json"
-        return read_camera(beside) if beside.is_file() else None
-    return read_camera(camera)
 
 
 def merge_summary(run: MergedRun) -> dict[str, Any]:
