@@ -9,7 +9,7 @@ from singlet_file import singlet_file
 
 from flarewright.cli.app import run
 from flarewright.io.images.exr import read_exr
-from flarewright.io.render_state.reference_state import read_state
+from flarewright.io.render_state.reference_state import read_reference_state
 from flarewright.render.reference import energy_ledger, estimator
 
 SMALL = ["render", "singlet.toml", "--light", "8,4", "--size", "24x16", "--no-starburst", "--no-png", "--ledger"]
@@ -63,7 +63,7 @@ def test_interrupted_says_how_to_go_on(capsys, monkeypatch):
     monkeypatch.setattr(estimator.Sums, "add", interrupt)
     assert run([*REFERENCE, "-o", "a.exr"]) == 130
     assert "to resume: flarewright render --resume a.state.npz -o a.exr" in capsys.readouterr().err
-    assert read_state("a.state.npz").batches == 3
+    assert read_reference_state("a.state.npz").batches == 3
 
 
 def test_a_state_of_another_light_is_refused(capsys):

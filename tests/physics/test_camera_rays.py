@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 from scipy import stats
 
-from flarewright.io.render_state.reference_state import read_state
+from flarewright.io.render_state.reference_state import read_reference_state
 from flarewright.kernels.montecarlo.forward import BESIDE, IN_PICTURE
 from flarewright.model import Camera, Holdout, Light, Lines, Output, Polygon, Project, Quality, Rectangle
 from flarewright.optics.colour.rgb import luminance_weights
@@ -246,6 +246,6 @@ def test_a_picture_made_from_the_camera(side, batches, resumed, tmp_path, monkey
     state = tmp_path / "a.state.npz"
     few = made["camera"].replace(quality=made["camera"].quality.replace(reference_samples=resumed * side**2))
     render(few, run=ReferenceRun(state_file=state), threads=1)
-    again = render(made["camera"], run=ReferenceRun(resume=read_state(state)), threads=1)
+    again = render(made["camera"], run=ReferenceRun(resume=read_reference_state(state)), threads=1)
     for a, b in zip(found["camera"].layers, again.layers, strict=True):
         assert a.pixels.tobytes() == b.pixels.tobytes()

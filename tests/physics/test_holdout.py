@@ -8,7 +8,7 @@ from PIL import Image
 
 from flarewright.errors import ProjectError
 from flarewright.io.project.project_file import project_text, read_project
-from flarewright.io.render_state.reference_state import read_state
+from flarewright.io.render_state.reference_state import read_reference_state
 from flarewright.model import Camera, Holdout, Light, Lines, Output, Polygon, Project, Quality, Rectangle
 from flarewright.optics.colour.rgb import luminance_weights
 from flarewright.optics.pupil.occlusion import hidden_part, visible_shape
@@ -159,10 +159,10 @@ def test_a_state_of_another_holdout_is_refused(tmp_path, monkeypatch):
     quality = {"reference_samples": 1, "reference_from": "light"}
     made = project(DISC, Holdout(image=matte(file, 94.0)), "reference", quality=quality)
     render(made, run=ReferenceRun(state_file=state))
-    render(made, run=ReferenceRun(resume=read_state(state)))
+    render(made, run=ReferenceRun(resume=read_reference_state(state)))
     matte(file, 96.0)
     with pytest.raises(ProjectError, match="another holdout"):
-        render(made, run=ReferenceRun(resume=read_state(state)))
+        render(made, run=ReferenceRun(resume=read_reference_state(state)))
 
 
 def test_grey_lets_its_part_through(tmp_path):

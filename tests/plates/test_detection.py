@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flarewright.errors import ProjectError
-from flarewright.plates.detection import LUMINANCE, Sources, find_sources, mean_luminance
+from flarewright.plates.detection import LUMINANCE, Sources, find_sources, log_average_luminance
 
 RNG = np.random.default_rng(3)
 ROWS, COLUMNS = np.mgrid[:120, :160] + 0.5
@@ -99,10 +99,10 @@ def test_shapes_that_are_no_rectangle_are_split_until_their_parts_are():
 
 def test_a_mean_in_stops_hardly_depends_on_a_small_sun():
     pixels = plate(0.2)
-    dark = mean_luminance(pixels)
+    dark = log_average_luminance(pixels)
     assert dark == pytest.approx(0.2, rel=0.01)
-    assert mean_luminance(disc(pixels, 80, 60, 3, 5000.0)) == pytest.approx(0.2, rel=0.1)
-    assert mean_luminance(plate(0.0)) == 0.0
+    assert log_average_luminance(disc(pixels, 80, 60, 3, 5000.0)) == pytest.approx(0.2, rel=0.1)
+    assert log_average_luminance(plate(0.0)) == 0.0
 
 
 def test_noise_above_the_threshold_is_refused_in_one_sentence():

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from flarewright.cli.app import run
-from flarewright.io.measurement.ghost_model_file import write_ghost_model, write_tracks
+from flarewright.io.measurement.ghost_model_file import write_ghost_model, write_ghost_tracks
 from flarewright.model.measurement.ghost_model import GhostModel, Halo, Reference
 from flarewright.model.measurement.ghost_tracks import Tracks
 from flarewright.model.project.scene import Lamp, SceneCamera
@@ -25,7 +25,7 @@ def scene(tmp_path):
     write_ghost_model(tmp_path / "unlit.json", whole.replace(reference=Reference()))
     text = (tmp_path / "whole.json").read_text()
     (tmp_path / "cut.json").write_text(text[: text.index('"reference"')])
-    write_tracks(tmp_path / "tracks.json", Tracks(ghosts=()))
+    write_ghost_tracks(tmp_path / "tracks.json", Tracks(ghosts=()))
 
     def write(*cameras, aim="[0, 10, 0]", lamp="[2, 10, 0]"):
         parts = [

@@ -22,7 +22,7 @@ _CUTS = 8
 
 
 @dataclass(frozen=True)
-class DetectionSettings:
+class SourceSettings:
     """How areas are described.
 
     Attributes
@@ -97,7 +97,7 @@ def plate_luminance(pixels: Pixels) -> Pixels:
     return np.maximum(pixels, 0.0) @ LUMINANCE.astype(np.float32)
 
 
-def mean_luminance(pixels: Pixels) -> float:
+def log_average_luminance(pixels: Pixels) -> float:
     """Return the geometric mean of the luminance of a plate, which a small bright sun hardly changes; 0 if it is black.
 
     Notes
@@ -118,7 +118,7 @@ def find_sources(
     *,
     matte: Pixels | None = None,
     least_px: int = 1,
-    settings: DetectionSettings | None = None,
+    settings: SourceSettings | None = None,
 ) -> Sources:
     """Find the sources of a plate.
 
@@ -132,7 +132,7 @@ def find_sources(
         Factor of each pixel, 0 to 1.
     least_px : int
         Smaller areas are left out.
-    settings : DetectionSettings, optional
+    settings : SourceSettings, optional
 
     Returns
     -------
@@ -142,7 +142,7 @@ def find_sources(
     Raises
     ------
     ProjectError
-        There are more areas than `DetectionSettings.most_areas`.
+        There are more areas than `SourceSettings.most_areas`.
 
     Notes
     -----
@@ -157,7 +157,7 @@ def find_sources(
     >>> found.centre_px.tolist(), found.light.tolist()
     ([[4.0, 3.0]], [[20.0, 20.0, 20.0]])
     """
-    settings = settings or DetectionSettings()
+    settings = settings or SourceSettings()
     values = np.maximum(pixels, np.float32(0.0))
     if matte is not None:
         values = values * matte[..., None]
@@ -209,7 +209,7 @@ def _hot_pixels(luminance: Pixels, over: Mask, rows: Indices, columns: Indices, 
 
 
 def _sources_of(
-    places: Floats, light: Floats, bright: Floats, hot: Floats, least_px: int, settings: DetectionSettings
+    places: Floats, light: Floats, bright: Floats, hot: Floats, least_px: int, settings: SourceSettings
 ) -> list[list[float]]:
     """Return the sources of one connected area as rows of `Sources.table`."""
     found: list[list[float]] = []
@@ -230,7 +230,7 @@ def _sources_of(
     return found
 
 
-def _split(places: Floats, light: Floats, bright: Floats, settings: DetectionSettings, deep: int) -> list[Indices]:
+def _split(places: Floats, light: Floats, bright: Floats, settings: SourceSettings, deep: int) -> list[Indices]:
     """Return the indices of the parts of an area."""
     everything: Indices = np.arange(len(places), dtype=np.intp)
     if deep == 0 or len(places) < settings.split_px:

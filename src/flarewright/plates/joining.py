@@ -16,7 +16,7 @@ from .tracking import Tracks
 
 
 @dataclass(frozen=True)
-class JoinSettings:
+class JoinedSourceSettings:
     """How many lights are joined ones.
 
     Attributes
@@ -28,14 +28,14 @@ class JoinSettings:
     joined_part: float = 0.5
 
 
-def joined(tracks: Tracks, most_lights: int, settings: JoinSettings | None = None) -> tuple[Tracks, int, int]:
+def joined(tracks: Tracks, most_lights: int, settings: JoinedSourceSettings | None = None) -> tuple[Tracks, int, int]:
     """Join the faintest sources, so that no frame has more lights than allowed.
 
     Parameters
     ----------
     tracks : Tracks
     most_lights : int
-    settings : JoinSettings, optional
+    settings : JoinedSourceSettings, optional
 
     Returns
     -------
@@ -48,7 +48,7 @@ def joined(tracks: Tracks, most_lights: int, settings: JoinSettings | None = Non
     present = bright > 0.0
     if int(present.sum(axis=0).max(initial=0)) <= most_lights:
         return tracks, 0, 0
-    groups = max(1, round(most_lights * (settings or JoinSettings()).joined_part))
+    groups = max(1, round(most_lights * (settings or JoinedSourceSettings()).joined_part))
     single = _singles(bright, present, most_lights - groups)
     others = np.flatnonzero(~single)
     weight = bright[others].sum(axis=1)

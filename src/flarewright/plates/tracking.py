@@ -21,7 +21,7 @@ from .detection import LUMINANCE, Sources
 
 
 @dataclass(frozen=True)
-class TrackingSettings:
+class SourceTrackSettings:
     """How sources of neighbouring frames are matched.
 
     Attributes
@@ -76,7 +76,7 @@ class Tracks:
 
 
 def follow(
-    frames: Sequence[int], found: Sequence[Sources], width_px: int, settings: TrackingSettings | None = None
+    frames: Sequence[int], found: Sequence[Sources], width_px: int, settings: SourceTrackSettings | None = None
 ) -> Tracks:
     """Match the sources of neighbouring frames.
 
@@ -88,7 +88,7 @@ def follow(
         One a frame.
     width_px : int
         Of the plate.
-    settings : TrackingSettings, optional
+    settings : SourceTrackSettings, optional
 
     Returns
     -------
@@ -100,7 +100,7 @@ def follow(
     Each source is expected where its last step leads. Pairs are accepted in the order of their costs, and equal costs
     in the order of the sources, so that the result is unique.
     """
-    settings = settings or TrackingSettings()
+    settings = settings or SourceTrackSettings()
     # the source of each track in each of its frames
     tracks: list[dict[int, int]] = []
     for k, sources in enumerate(found):
@@ -117,7 +117,7 @@ def follow(
 
 
 def _pairs(
-    found: Sequence[Sources], tracks: Sequence[dict[int, int]], k: int, width_px: int, settings: TrackingSettings
+    found: Sequence[Sources], tracks: Sequence[dict[int, int]], k: int, width_px: int, settings: SourceTrackSettings
 ) -> list[tuple[int, int]]:
     """Return which tracks go on with which sources of frame `k`."""
     now = found[k]

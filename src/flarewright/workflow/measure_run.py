@@ -13,9 +13,9 @@ from ..io.files.sentences import count
 from ..io.measurement.ghost_model_file import (
     read_corrections,
     read_ghost_model,
-    read_tracks,
+    read_ghost_tracks,
     write_ghost_model,
-    write_tracks,
+    write_ghost_tracks,
 )
 from ..io.measurement.merged import read_run
 from ..measure.compression.prune import count_parameters
@@ -83,12 +83,12 @@ class _Files:
 
     def read_tracks(self) -> Tracks:
         if self._tracks is None:
-            self._tracks = read_tracks(self._folder / TRACKS)
+            self._tracks = read_ghost_tracks(self._folder / TRACKS)
         return self._tracks
 
     def write_tracks(self, tracks: Tracks) -> None:
         self._tracks = None
-        write_tracks(self._folder / TRACKS, tracks)
+        write_ghost_tracks(self._folder / TRACKS, tracks)
 
 
 @dataclass(frozen=True)

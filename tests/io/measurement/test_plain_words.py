@@ -20,8 +20,8 @@ from flarewright.io.measurement.captures import read_camera, read_captures
 from flarewright.io.measurement.ghost_model_file import (
     read_corrections,
     read_ghost_model,
+    read_ghost_tracks,
     read_replay_camera,
-    read_tracks,
 )
 from flarewright.io.measurement.merged import read_run
 from flarewright.io.project.project_file import project_from_data
@@ -295,7 +295,7 @@ JSON_FILES: dict[str, tuple[Callable[[Path], object], dict[str, Any]]] = {
         },
     ),
     "tracks": (
-        read_tracks,
+        read_ghost_tracks,
         {
             "schema_version": 1,
             "ghosts": [

@@ -9,7 +9,7 @@ from test_prune import model_of
 
 from flarewright.cli.app import run as command
 from flarewright.cli.measure.report import _of_another_model
-from flarewright.io.measurement.ghost_model_file import read_ghost_model, read_tracks, write_ghost_model
+from flarewright.io.measurement.ghost_model_file import read_ghost_model, read_ghost_tracks, write_ghost_model
 from flarewright.measure.compression.prune import count_parameters
 from flarewright.model.measurement.ghost_model import BezierGhost
 
@@ -39,7 +39,7 @@ def test_track_and_compress_write_small_files_and_keep_them(folder, capsys):
         assert reported["ghosts"] == 2
         assert reported["kept"] is False
         assert reported["file"].endswith(file)
-    tracks = read_tracks(folder / "tracks.json")
+    tracks = read_ghost_tracks(folder / "tracks.json")
     assert [len(one.lives) for one in tracks.ghosts] == [1, 1]
     small = read_ghost_model(folder / "compact.json")
     assert small.schema_version == 1

@@ -19,7 +19,7 @@ from flarewright.measure.core.parameter_vector import NUMBERS, channel_of
 from flarewright.measure.fitting.alternating_fit import to_model
 from flarewright.measure.fitting.detected_ghost import DetectedGhost
 from flarewright.measure.replay.model_image import light_px, replay_model
-from flarewright.measure.replay.placement import brightness_gain, constellation_and_roll
+from flarewright.measure.replay.placement import brightness_gain, constellation_of_light
 from flarewright.model.measurement.ghost_model import AberrationGhost, BezierGhost, GhostModel, Halo, Reference, Star
 from flarewright.model.measurement.replay_camera import ReplayCamera
 
@@ -55,16 +55,16 @@ def planted() -> GhostModel:
 def test_constellation_and_roll_are_equations_8_1_and_8_2():
     forward, up = (0.3, -0.2, -1.0), (0.1, 1.0, 0.2)
     light = (4.0, 2.0, -7.0)
-    constellation, roll = constellation_and_roll((1.0, 0.5, 0.2), forward, up, light)
+    constellation, roll = constellation_of_light((1.0, 0.5, 0.2), forward, up, light)
     f, away = np.array(forward), np.array(light) - (1.0, 0.5, 0.2)
     cosine = f @ away / np.linalg.norm(f) / np.linalg.norm(away)
     assert constellation == pytest.approx(np.degrees(np.arccos(cosine)), abs=1e-9)
     z = -f / np.linalg.norm(f)
     x = np.cross(up, z) / np.linalg.norm(np.cross(up, z))
     assert roll == pytest.approx(np.degrees(np.arctan2(np.cross(z, x) @ away, x @ away)), abs=1e-9)
-    assert constellation_and_roll((0, 0, 0), (0, 0, -1), (0, 1, 0), (0, 1, -1)) == pytest.approx((45.0, 90.0))
+    assert constellation_of_light((0, 0, 0), (0, 0, -1), (0, 1, 0), (0, 1, -1)) == pytest.approx((45.0, 90.0))
     # the arc cosine of 8.1 gives 0 here
-    assert constellation_and_roll((0, 0, 0), (0, 0, -1), (0, 1, 0), (1e-9, 0, -1))[0] == pytest.approx(5.7296e-8)
+    assert constellation_of_light((0, 0, 0), (0, 0, -1), (0, 1, 0), (1e-9, 0, -1))[0] == pytest.approx(5.7296e-8)
 
 
 @pytest.mark.parametrize(
@@ -91,9 +91,9 @@ def test_a_brightness_that_no_picture_holds_is_refused(change):
 
 def test_a_camera_that_looks_nowhere_is_reported_as_such():
     with pytest.raises(FlarewrightError, match="forward has no length"):
-        constellation_and_roll((0, 0, 0), (0, 0, 0), (0, 1, 0), (0, 1, -1))
+        constellation_of_light((0, 0, 0), (0, 0, 0), (0, 1, 0), (0, 1, -1))
     with pytest.raises(FlarewrightError, match="light at the camera's own place"):
-        constellation_and_roll((0, 1, 0), (0, 0, -1), (0, 1, 0), (0, 1, 0))
+        constellation_of_light((0, 1, 0), (0, 0, -1), (0, 1, 0), (0, 1, 0))
 
 
 def test_without_memory_a_replay_reports_what_its_own_flags_can_do(tmp_path, capsys, monkeypatch):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flarewright.errors import OutputError, ProjectError
-from flarewright.io.render_state.reference_state import read_state, write_state
+from flarewright.io.render_state.reference_state import read_reference_state, write_reference_state
 from flarewright.model import BlackBody, Camera, Imperfection, Iris, Light, Output, Project, Quality, Scatter, Surface
 from flarewright.optics.colour.rgb import luminance_weights
 from flarewright.render.reference import energy_ledger as ledger_pass
@@ -83,10 +83,10 @@ def test_resumed_is_the_same_bit_for_bit(eight, tmp_path):
     file = tmp_path / "a.state.npz"
     three = project(reference_samples=3 * BATCH, lights=LIGHTS)
     render(three, run=ReferenceRun(state_file=file))
-    state = read_state(file)
+    state = read_reference_state(file)
     assert (state.batches, state.project) == (3, three)
     same(eight, render(eight.project, run=ReferenceRun(resume=state, state_file=file)))
-    assert read_state(file).batches == 8
+    assert read_reference_state(file).batches == 8
 
 
 def test_interrupted_keeps_what_was_done(eight, tmp_path):
@@ -100,16 +100,16 @@ def test_interrupted_keeps_what_was_done(eight, tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         render(eight.project, progress=interrupt, run=ReferenceRun(state_file=file))
-    assert read_state(file).batches == 5
+    assert read_reference_state(file).batches == 5
     assert [part for part, _ in seen] == pytest.approx([k / 8 for k in range(1, 6)])
-    same(eight, render(eight.project, run=ReferenceRun(resume=read_state(file))))
+    same(eight, render(eight.project, run=ReferenceRun(resume=read_reference_state(file))))
 
 
 def test_a_full_disk_costs_the_state_and_not_the_picture(eight, tmp_path, monkeypatch):
     def full(path, _state):
         raise OutputError(f"cannot write {path}: no space left on device")
 
-    monkeypatch.setattr(reference_pass, "write_state", full)
+    monkeypatch.setattr(reference_pass, "write_reference_state", full)
     drawn = render(eight.project, run=ReferenceRun(state_file=tmp_path / "a.state.npz"))
     same(eight, drawn)
     assert sum(f"cannot write {tmp_path / 'a.state.npz'}" in remark for remark in drawn.remarks) == 1
@@ -161,7 +161,7 @@ def test_spectrum_in_fine_steps_or_as_final_traces_it():
 def test_a_state_of_other_settings_is_refused(tmp_path):
     file = tmp_path / "a.state.npz"
     render(project(reference_samples=2 * BATCH), run=ReferenceRun(state_file=file))
-    state = read_state(file)
+    state = read_reference_state(file)
     for other, word in (
         (project(seed=5), "seed"),
         (project(lights=LIGHTS), "light"),
@@ -178,18 +178,18 @@ def test_a_state_of_other_settings_is_refused(tmp_path):
 def test_damaged_states_are_errors(tmp_path):
     file = tmp_path / "a.state.npz"
     render(project(reference_samples=2 * BATCH), run=ReferenceRun(state_file=file))
-    state = read_state(file)
-    write_state(file, replace(state, batches=7))
-    assert read_state(file).batches == 7
+    state = read_reference_state(file)
+    write_reference_state(file, replace(state, batches=7))
+    assert read_reference_state(file).batches == 7
     whole = file.read_bytes()
     for content in (whole[: len(whole) // 2], b"", b"no archive", whole.replace(b"sums.planes", b"sums.plenas")):
         file.write_bytes(content)
         with pytest.raises(ProjectError, match=r"state file of a reference render.*restart without --resume"):
-            read_state(file)
+            read_reference_state(file)
     with pytest.raises(ProjectError, match="does not exist"):
-        read_state(tmp_path / "b.npz")
+        read_reference_state(tmp_path / "b.npz")
     with pytest.raises(ProjectError, match="does not exist"):
-        read_state(tmp_path)
+        read_reference_state(tmp_path)
 
 
 def test_a_state_of_another_version_is_an_error(tmp_path, monkeypatch):
@@ -198,7 +198,7 @@ def test_a_state_of_another_version_is_an_error(tmp_path, monkeypatch):
     render(project(reference_samples=2 * BATCH), run=ReferenceRun(state_file=file))
     monkeypatch.undo()
     with pytest.raises(ProjectError, match=r"version 0\.0\.9"):
-        read_state(file)
+        read_reference_state(file)
 
 
 # ---------------------------------------------------------------------------------------------------------------------

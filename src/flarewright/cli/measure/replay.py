@@ -77,12 +77,12 @@ def replay(
 
 def _place(camera: ReplayCamera, constellation_deg: float | None, roll_deg: float | None) -> tuple[float, float]:
     """Return constellation and roll of the light, degrees: those of the camera file, or as given."""
-    from ...measure.replay.placement import constellation_and_roll
+    from ...measure.replay.placement import constellation_of_light
 
     if camera.light is not None:
         if constellation_deg is not None or roll_deg is not None:
             raise FlarewrightError("the camera file places the light; omit --constellation and --roll")
-        constellation_deg, roll_deg = constellation_and_roll(camera.position, camera.forward, camera.up, camera.light)
+        constellation_deg, roll_deg = constellation_of_light(camera.position, camera.forward, camera.up, camera.light)
     elif constellation_deg is None:
         raise FlarewrightError("no place of the light; give --constellation DEG, or a --camera file with a light")
     return constellation_deg, roll_deg or 0.0

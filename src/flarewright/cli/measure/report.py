@@ -31,7 +31,7 @@ def report(
     run = read_run(folder)
     check_place(place, (".html", ".htm"))
     from ...io.files.sentences import count
-    from ...io.measurement.ghost_model_file import read_ghost_model, read_tracks
+    from ...io.measurement.ghost_model_file import read_ghost_model, read_ghost_tracks
     from ...measure.report.page import strange, write_report
     from ...workflow.measure_provenance import COMPACT, MODEL, TRACKS
 
@@ -51,7 +51,7 @@ def report(
         )
     print_remarks(remarks)
     wanted = model is None and (known is not None or not remarks) and TRACKS not in old and (folder / TRACKS).is_file()
-    tracks = read_tracks(folder / TRACKS) if wanted else None
+    tracks = read_ghost_tracks(folder / TRACKS) if wanted else None
     write_report(folder, run, known, place, tracks, remarks)
     if as_json:
         ghosts = None if known is None else len(known.ghosts)

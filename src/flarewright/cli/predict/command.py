@@ -23,7 +23,7 @@ from ..common import (
 )
 from ..option_record import with_options
 from .options.record import PredictOptions
-from .scene import SearchRoom, is_scene, predict_scene
+from .scene import SearchRoom, is_scene_file, predict_scene
 
 if TYPE_CHECKING:
     from ...model import Project
@@ -65,7 +65,7 @@ def predict(options: PredictOptions) -> None:
     workers_of(options.cluster, options.processes, options.threads)
     # any number of processes draws the same pictures
     unnamed = repr(replace(options, threads=None, processes=None, cluster=None))
-    if is_scene(options.subject):
+    if is_scene_file(options.subject):
         _refuse(_given(options, _OF_LENS + _OF_MODEL + _OF_CURVES), "a scene", "the scene file sets it")
         predict_scene(Path(options.subject), options, _search_room(options), unnamed)
         return

@@ -31,7 +31,7 @@ class SearchRoom:
     shortest_shot_s: float
 
 
-def is_scene(subject: str) -> bool:
+def is_scene_file(subject: str) -> bool:
     """Return whether an argument names a scene file."""
     from ...errors import FileError
     from ...io.files.text_file import read_toml

@@ -249,9 +249,9 @@ def keep_inputs(settings: Project, project_file: Path | None, outputs: list[Path
 def _read_state(path: Path | None) -> ReferenceState | None:
     if path is None:
         return None
-    from ...io.render_state.reference_state import read_state
+    from ...io.render_state.reference_state import read_reference_state
 
-    return read_state(path)
+    return read_reference_state(path)
 
 
 def _reference_run(options: RenderOptions, project: Project, state: ReferenceState | None) -> ReferenceRun | None:

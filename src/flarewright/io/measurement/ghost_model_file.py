@@ -90,12 +90,12 @@ def write_ghost_model(path: str | Path, model: GhostModel) -> None:
     _write(path, model)
 
 
-def write_tracks(path: str | Path, tracks: Tracks) -> None:
+def write_ghost_tracks(path: str | Path, tracks: Tracks) -> None:
     """Write ghost tracks as JSON, atomically; raises as `write_ghost_model`."""
     _write(path, tracks)
 
 
-def read_tracks(path: str | Path) -> Tracks:
+def read_ghost_tracks(path: str | Path) -> Tracks:
     """Read ghost tracks; raises as `read_ghost_model`."""
     return _read(path, "tracks of ghosts", Tracks)
 

@@ -2,5 +2,5 @@
 
 - `flare_cache`: `read_cache`, `write_cache`, flare pictures of a prediction
 - `partial_planes`: `read_planes`, `write_planes`, ghosts of an interrupted final render
-- `reference_state`: `read_state`, `write_state`, interrupted reference renders
+- `reference_state`: `read_reference_state`, `write_reference_state`, interrupted reference renders
 """

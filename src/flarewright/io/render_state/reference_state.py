@@ -24,7 +24,7 @@ SUFFIX = ".state.npz"
 """Suffix of a state file, appended to the picture's name."""
 
 
-def write_state(path: Path, state: ReferenceState) -> None:
+def write_reference_state(path: Path, state: ReferenceState) -> None:
     """Write a state atomically.
 
     Parameters
@@ -55,7 +55,7 @@ def write_state(path: Path, state: ReferenceState) -> None:
     write_atomically(path, write)
 
 
-def read_state(path: str | Path) -> ReferenceState:
+def read_reference_state(path: str | Path) -> ReferenceState:
     """Read a state file.
 
     Parameters

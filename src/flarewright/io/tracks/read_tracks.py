@@ -13,7 +13,7 @@ from .after_effects import is_after_effects, read_after_effects
 from .equalizer import is_equalizer, read_equalizer
 from .nuke import is_columns, is_nuke, read_columns, read_nuke
 from .numbers import LARGEST_BYTES
-from .scene_json import is_scene, read_scene
+from .scene_json import is_scene_json, read_scene
 from .syntheyes import is_syntheyes, read_syntheyes
 from .table import is_table, read_table
 from .track import Origin, TrackFile
@@ -121,7 +121,7 @@ def _format_of(text: str) -> TrackFormat | None:
     """Return the format of a text by its contents."""
     found: tuple[tuple[TrackFormat, bool], ...] = (
         ("after-effects", is_after_effects(text)),
-        ("blender", is_scene(text)),
+        ("blender", is_scene_json(text)),
         ("nuke", is_nuke(text)),
         ("3de", is_equalizer(text)),
         ("csv", is_table(text)),

@@ -66,7 +66,7 @@ class _Scene(Frozen):
 Posed = TypeVar("Posed", bound=_Posed)
 
 
-def is_scene(text: str) -> bool:
+def is_scene_json(text: str) -> bool:
     """Return whether a text is JSON of a scene."""
     return text.lstrip().startswith("{") and f'"{FORMAT}"' in text
 

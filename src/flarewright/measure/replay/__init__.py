@@ -5,7 +5,7 @@ The public entry points are `replay_model` and, for projects, `render_any`.
 - `model_image`: `replay_model` draws the layers of a model; `draw` its ghosts only; `light_px`, `within_reach`
 - `measured_project`: `render_any`, `render_measured` and `check_measured` handle a project with a measured flare
 - `light_place`: `measured_angles_at`, the field angles of a light at a pixel
-- `placement`: `constellation_and_roll` of a light in a scene; `brightness_gain` at other camera settings;
+- `placement`: `constellation_of_light` in a scene; `brightness_gain` at other camera settings;
   `over_clipping`
 - `flare_only`: `counted_flare` draws the light that counts as flare
 - `art`: `ghost_gains` applies the rules of art direction

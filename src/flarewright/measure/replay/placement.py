@@ -9,14 +9,13 @@ import numpy as np
 from ...errors import FlarewrightError
 from ...model.measurement.ghost_model import GhostModel, Reference
 from ...model.measurement.replay_camera import ReplayCamera, Vector
-from ...optics.lens.field_angles import POWERS, brightness_scale, view_axes
-from ...optics.lens.field_angles import constellation_and_roll as optics_constellation
+from ...optics.lens.field_angles import POWERS, brightness_scale, constellation_and_roll, view_axes
 
 # limit of a brightness factor that 32-bit pixels can hold
 _FAINTEST = 1e-20
 
 
-def constellation_and_roll(position: Vector, forward: Vector, up: Vector, light: Vector) -> tuple[float, float]:
+def constellation_of_light(position: Vector, forward: Vector, up: Vector, light: Vector) -> tuple[float, float]:
     """Return the angle between a camera's axis and a light, and the light's direction about the axis.
 
     Parameters
@@ -47,7 +46,7 @@ def constellation_and_roll(position: Vector, forward: Vector, up: Vector, light:
     axes = view_axes(forward, up)
     if np.isnan(axes).any():
         raise FlarewrightError("the camera's up is along its forward; give another up")
-    constellation_deg, roll_deg = optics_constellation(axes, away)
+    constellation_deg, roll_deg = constellation_and_roll(axes, away)
     return float(constellation_deg), float(roll_deg)
 
 

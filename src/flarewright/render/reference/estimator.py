@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import OutputError, ProjectError
-from ...io.render_state.reference_state import write_state
+from ...io.render_state.reference_state import write_reference_state
 from ...model import Layer, Quality
 from ...model.project.reference_state import ReferenceState
 from ...typing import Floats, Progress
@@ -167,7 +167,7 @@ def render_reference(
             unsaved.clear()
             # a full disk costs the state, not the picture
             try:
-                write_state(run.state_file, state)
+                write_reference_state(run.state_file, state)
             except OutputError as error:
                 unsaved.append(f"this render cannot be resumed: {error}")
 

@@ -23,12 +23,12 @@ from ...io.files.text_file import digest_of
 from ...io.images.plate_picture import PlatePicture
 from ...jobs.frame_list import FramePattern, frames_text
 from ...jobs.processes import Executor, shares, work_off
-from ...plates.detection import LUMINANCE, Sources, find_sources, mean_luminance
+from ...plates.detection import LUMINANCE, Sources, find_sources, log_average_luminance
 from ...plates.joining import joined
 from ...plates.lights import PlateTracks, plate_tracks
 from ...plates.measured_plate import measured_pixels
 from ...plates.settings import PlateSettings
-from ...plates.tracking import TrackingSettings, follow, steady
+from ...plates.tracking import SourceTrackSettings, follow, steady
 from ...typing import Floats
 from .plate_files import is_still, plate_digest, plate_matte, plate_name, plate_picture
 
@@ -196,7 +196,7 @@ def plate_shot(
         frames[:1] if still else frames,
         found[:1] if still else found,
         first.size_px[0],
-        TrackingSettings(longest_gap=settings.fade),
+        SourceTrackSettings(longest_gap=settings.fade),
     )
     tracks = steady(tracks, threshold, settings.knee_stops, 0 if still else settings.fade)
     limited, joined_sources, groups = joined(tracks, settings.most_lights)
@@ -229,7 +229,7 @@ def _threshold(settings: PlateSettings, frames: Sequence[int], first: PlatePictu
         return settings.threshold, []
     step = max(1, -(-len(frames) // _MEAN_FRAMES))
     pictures = [first, *(plate_picture(settings, frame) for frame in frames[step::step])]
-    mean = float(np.mean([mean_luminance(measured_pixels(plate, settings.highlights)) for plate in pictures]))
+    mean = float(np.mean([log_average_luminance(measured_pixels(plate, settings.highlights)) for plate in pictures]))
     if mean <= 0.0:
         raise ProjectError("the plate is black, so a threshold in stops above its mean is none; give --threshold")
     found = mean * 2.0**settings.stops
