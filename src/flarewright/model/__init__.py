@@ -4,7 +4,7 @@ The records re-exported here are the public ones. Files are read and written in 
 
 - `base`: `Frozen`, the base class of all records
 - `bytes_text`: arrays of bytes as base64 text
-- `layer`: `Layer`, a named linear image
+- `layer`: `Layer`, a named linear image; `part_inside`, its part in a picture
 - `matte`: `GhostMatte`, which ghosts light each pixel
 - `lens`: prescriptions, coatings, glasses, iris, plates
 - `project`: projects, cameras, lights, art direction, design targets, scenes

@@ -29,3 +29,22 @@ class Layer:
     pixels: Pixels
     window: tuple[int, int, int, int]
     about: dict[str, str | float] = field(default_factory=dict)
+
+
+def part_inside(window: tuple[int, int, int, int], size_px: tuple[int, int]) -> tuple[int, int, int, int]:
+    """Return the part of a window that lies inside a picture.
+
+    Parameters
+    ----------
+    window : tuple of int
+        x, y, width, height.
+    size_px : tuple of int
+        Width and height of the picture.
+
+    Returns
+    -------
+    left, top, right, bottom : int
+        Right is at most left, or bottom at most top, where no part is inside.
+    """
+    x, y, width, height = window
+    return max(x, 0), max(y, 0), min(x + width, size_px[0]), min(y + height, size_px[1])

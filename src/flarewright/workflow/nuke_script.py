@@ -14,6 +14,7 @@ from ..errors import OutputError, ProjectError
 from ..io.files.door import shown
 from ..io.images.exr import ExrContents, read_exr, scale_in_exr
 from ..jobs.frame_list import FramePattern, frames_text
+from ..render.image.compose import add_layer
 from .nuke_graph import Node, Passes, flare_nodes, layers_text, nodes_text, quoted
 
 BEAUTY = "beauty"
@@ -225,8 +226,7 @@ def _passes(contents: ExrContents, singles: bool) -> tuple[Passes, list[str]]:
     width, height = contents.size_px
     total = np.zeros((height, width, 3))
     for one in parts:
-        x, y, w, h = one.window
-        total[max(y, 0) : y + h, max(x, 0) : x + w] += one.pixels[max(-y, 0) : height - y, max(-x, 0) : width - x]
+        add_layer(total, one)
     beauty = np.asarray(first.pixels, dtype=np.float64)
     names = [one.name for one in parts]
     wrong = float(np.abs(total - beauty).max()) > _ROUNDED * max(float(np.abs(beauty).max()), 1e-300)

@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 
 from ...colorimetry import PRIMARIES
 from ...errors import FileError, FlarewrightError, OutputError, raised_as
-from ...model.layer import Layer
+from ...model.layer import Layer, part_inside
 from ...model.matte import GhostMatte
 from ...model.project.camera import Colorspace
 from ...typing import Floats, Pixels
@@ -535,9 +535,9 @@ def _over_picture(layer: Layer, size_px: tuple[int, int]) -> tuple[Pixels, tuple
     picture = (0, 0, width, height)
     if layer.window == picture:
         return layer.pixels, picture
-    x, y, w, h = layer.window
+    x, y, *_ = layer.window
     pixels = np.zeros((height, width, 3), np.float32)
-    left, top, right, bottom = max(x, 0), max(y, 0), min(x + w, width), min(y + h, height)
+    left, top, right, bottom = part_inside(layer.window, size_px)
     if left < right and top < bottom:
         pixels[top:bottom, left:right] = layer.pixels[top - y : bottom - y, left - x : right - x]
     return pixels, picture

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import FlarewrightError
-from ...model.layer import Layer
+from ...model.layer import Layer, part_inside
 
 
 def beauty(layers: Sequence[Layer], size_px: tuple[int, int] | None = None) -> Layer:
@@ -67,7 +67,7 @@ def add_layer(total: NDArray[np.floating[Any]], layer: Layer) -> None:
     layer : Layer
         Parts of its window outside the picture are ignored.
     """
-    x, y, w, h = layer.window
-    left, top, right, bottom = max(x, 0), max(y, 0), min(x + w, total.shape[1]), min(y + h, total.shape[0])
+    x, y, *_ = layer.window
+    left, top, right, bottom = part_inside(layer.window, (total.shape[1], total.shape[0]))
     if left < right and top < bottom:
         total[top:bottom, left:right] += layer.pixels[top - y : bottom - y, left - x : right - x]

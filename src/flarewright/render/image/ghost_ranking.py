@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Layer
+from ...model.layer import part_inside
 from ...model.matte import GhostMatte
 from ...model.project.camera import Colorspace
 from ...optics.colour.rgb import luminance_weights
@@ -55,9 +56,9 @@ class GhostRanking:
             x, y, width and height of `light` in the picture; what lies outside is left out.
         """
         number = self._numbers.setdefault(name, len(self._numbers))
-        x, y, w, h = window
+        x, y, *_ = window
         _, height, width = self._light.shape
-        left, top, right, bottom = max(x, 0), max(y, 0), min(x + w, width), min(y + h, height)
+        left, top, right, bottom = part_inside(window, (width, height))
         for start in range(top, bottom, _STRIP):
             rows = slice(start, min(start + _STRIP, bottom))
             seen = light[rows.start - y : rows.stop - y, left - x : max(right, left) - x]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Layer, Light
+from ...model.layer import part_inside
 from ...optics.colour.rgb import brightest_channel, luminance_weights, xyz_to_rgb_matrix
 from ...optics.colour.spectrum import spectrum_xyz
 from ...typing import Floats, Pixels
@@ -159,8 +160,8 @@ def ghost_mask(
     planes = [(layer, layer.pixels @ weights) for layer in ghosts]
     planes.sort(key=lambda pair: -float(pair[1].sum(dtype=np.float64)))
     for layer, plane in planes:
-        x, y, wide, high = layer.window
-        left, top, right, bottom = max(x, 0), max(y, 0), min(x + wide, size_px[0]), min(y + high, size_px[1])
+        x, y, *_ = layer.window
+        left, top, right, bottom = part_inside(layer.window, size_px)
         seen = plane[top - y : max(top, bottom) - y, left - x : max(left, right) - x]
         covers = seen >= threshold
         if not covers.any():

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...io.project.project_file import project_text
 from ...model import Layer, Project
 from ...model.project.dataset import DatasetSpec
+from ...render.image.compose import beauty
 from ...render.render import Rendering
 from ...render.render import render as render_project
 from ...typing import Pixels
@@ -115,17 +116,7 @@ def _light(rendering: Rendering, size_px: tuple[int, int], scale: float) -> dict
 
 
 def _whole(layer: Layer | None, size_px: tuple[int, int], scale: float) -> Pixels:
-    wide, high = size_px
-    if layer is not None and layer.window == (0, 0, wide, high):
-        return layer.pixels * np.float32(scale)
-    whole = np.zeros((high, wide, 3), np.float32)
-    if layer is not None:
-        x, y, across, down = layer.window
-        left, top, right, bottom = max(x, 0), max(y, 0), min(x + across, wide), min(y + down, high)
-        if left < right and top < bottom:
-            part = layer.pixels[top - y : bottom - y, left - x : right - x]
-            whole[top:bottom, left:right] = part * np.float32(scale)
-    return whole
+    return beauty([] if layer is None else [layer], size_px).pixels * np.float32(scale)
 
 
 def _light_images(rendering: Rendering, project: Project) -> list[LightImage]:
