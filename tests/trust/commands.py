@@ -10,7 +10,7 @@ import typer
 from typer.models import ArgumentInfo, OptionInfo
 
 from flarewright.cli.app import app
-from flarewright.cli.option_words import kinds_of
+from flarewright.cli.option_words import types_within
 
 SMALL = ("--threads", "1")
 
@@ -101,7 +101,7 @@ def _below(group: typer.Typer, path: tuple[str, ...]) -> Iterator[tuple[str, Any
 def options(function: Any) -> Iterator[tuple[str, type, str]]:
     """Yield the flag, the type and the placeholder of each option with a value."""
     for name, hint in get_type_hints(function, include_extras=True).items():
-        kinds = list(kinds_of(hint))
+        kinds = list(types_within(hint))
         kind = next((each for each in (bool, int, float, Path, str) if each in kinds), str)
         info = next((each for each in getattr(hint, "__metadata__", ()) if isinstance(each, OptionInfo)), None)
         argument = any(isinstance(each, ArgumentInfo) for each in getattr(hint, "__metadata__", ()))

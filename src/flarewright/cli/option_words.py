@@ -28,7 +28,7 @@ def name_values(app: typer.Typer) -> None:
         for hint in hints.values():
             for option in getattr(hint, "__metadata__", ()):
                 if isinstance(option, OptionInfo) and option.metavar is None:
-                    option.metavar = next((_WORDS[kind] for kind in kinds_of(hint) if kind in _WORDS), None)
+                    option.metavar = next((_WORDS[kind] for kind in types_within(hint) if kind in _WORDS), None)
         # evaluate the annotation once and store it, or the change would be lost
         command.callback.__annotations__ = hints
     for group in app.registered_groups:
@@ -36,9 +36,9 @@ def name_values(app: typer.Typer) -> None:
             name_values(group.typer_instance)
 
 
-def kinds_of(hint: Any) -> Iterator[Any]:
+def types_within(hint: Any) -> Iterator[Any]:
     """Yield the types within an annotation, including those of lists and unions."""
     yield hint
     parts = get_args(hint)
     for part in parts[:1] if get_origin(hint) is Annotated else parts:
-        yield from kinds_of(part)
+        yield from types_within(part)

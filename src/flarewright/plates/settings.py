@@ -43,7 +43,7 @@ class PlateSettings:
     threshold : float or None
         Plate value (luminance) above which a pixel belongs to a source; None: `stops`.
     stops : float
-        The threshold in stops above the mean luminance of the plates (`detection.mean_luminance`).
+        The threshold in stops above the mean luminance of the plates (`detection.log_average_luminance`).
     knee_stops : float
         A source whose brightest pixel is this far above the threshold counts in full; at the threshold it counts
         nothing. Only in sequences, over `fade` frames.

@@ -90,7 +90,7 @@ def test_other_lenses_with_the_same_ghosts_are_not_looked_for_any_more(monkeypat
     assert state.best.cost <= SOLVED
     flag = Flag(0)
     late = counted(monkeypatch, null_space, "solve", flag) + counted(monkeypatch, null_space, "polish", flag)
-    assert null_space.same_ghosts(problem, state.best, over=flag) == (state.best,)
+    assert null_space.lenses_with_same_ghosts(problem, state.best, over=flag) == (state.best,)
     assert late == []
 
 

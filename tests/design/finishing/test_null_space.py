@@ -7,7 +7,7 @@ import pytest
 from planted import planted
 
 from flarewright.design.finishing import null_space
-from flarewright.design.finishing.null_space import moderation, same_ghosts, to_the_middle
+from flarewright.design.finishing.null_space import lenses_with_same_ghosts, moderation, to_the_middle
 from flarewright.design.problem.prescription import Structure
 from flarewright.design.problem.problem import SOLVED, LensCandidate
 from flarewright.design.solvers.polish import polish
@@ -50,7 +50,7 @@ def test_what_is_unsolved_stays():
     problem, solved = free_planted(signed=True)
     far = LensCandidate(1.0, solved.structure, solved.x)
     assert to_the_middle(problem, far) is far
-    assert same_ghosts(problem, far) == (far,)
+    assert lenses_with_same_ghosts(problem, far) == (far,)
 
 
 # one of the three other structures has the same ghosts
@@ -64,7 +64,7 @@ def test_other_structures_have_the_ghosts_too(monkeypatch, others):
         monkeypatch.setattr(null_space, "SEARCHES", 1000)
         assert {solved.structure, *others} < set(problem.structures)
         problem = replace(problem, structures=(solved.structure, *others))
-    found = same_ghosts(problem, solved, seed=1)
+    found = lenses_with_same_ghosts(problem, solved, seed=1)
     assert {one.structure for one in found} == {solved.structure, OTHER}
     assert len({one.structure for one in found}) == len(found)
     assert all(one.cost <= SOLVED for one in found)

@@ -15,7 +15,7 @@ from flarewright.workflow.training_pairs.draw import (
     draw_item,
     draw_number,
     draw_text,
-    lens_of,
+    drawn_lens,
     splits_of,
 )
 
@@ -113,7 +113,7 @@ def test_splits_share_out_lenses_and_every_split_has_one():
     assert any(splits_of(spec.replace(seed=seed)) != shared for seed in range(1, 5))
     named = splits_of(spec_of(splits={"test": ["canon-28-80"], "val": ["flektogon-35"]}))
     assert {name for name, split in named.items() if split != "train"} == {"canon-28-80", "flektogon-35"}
-    assert {lens_of(spec, index) for index in range(60)} == set(LENSES)
+    assert {drawn_lens(spec, index) for index in range(60)} == set(LENSES)
 
 
 def test_a_lens_that_cannot_be_used_is_named_before_the_work():

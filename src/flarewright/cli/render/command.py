@@ -109,10 +109,10 @@ def project_of_options(
     _check_bits(options)
     from ...io.project.project_file import read_project
     from .framing import framed
-    from .look_flags import photographed, put_look, settings_of
+    from .look_flags import flags_with_look, photographed, settings_of
     from .project_flags import build_project, known_lights, project_of
     from .sun_light import sun_remark
-    from .tracks import given_tracks, placed, with_given_tracks, with_lights
+    from .tracks import given_tracks, with_given_tracks, with_lights, with_pixel_lights
 
     _check_places(options, timeline)
     base = options.base
@@ -126,7 +126,7 @@ def project_of_options(
     given, plain = settings_of(flags), options.ideal or options.project is not None or state is not None
     remarks: list[str] = []
     if options.look is not None:
-        flags, of_look, unfit = put_look(flags, options.look)
+        flags, of_look, unfit = flags_with_look(flags, options.look)
         given, remarks = given | of_look, list(unfit)
     if flags.tracked:
         known = known_lights(flags, () if flags.base is None else flags.base.lights)
@@ -148,7 +148,9 @@ def project_of_options(
         settings, moment = _at_moment(settings, options)
         remarks = [moment, *remarks]
     if options.light_px:
-        settings, found = placed(settings, options, len(options.light), counted_px, over_time=timeline is not None)
+        settings, found = with_pixel_lights(
+            settings, options, len(options.light), counted_px, over_time=timeline is not None
+        )
         remarks += found
     return flags, settings, remarks
 

@@ -145,7 +145,7 @@ def ghosts(options: GhostsOptions) -> None:
         veil = veiling_glare(project, options.wavelength_nm)
     print_remarks(dict.fromkeys((*opened.remarks, *settled.remarks, *found)))
     if options.as_csv:
-        print(ghost_csv(table, options.brightest), end="")
+        print(table_csv(table, options.brightest), end="")
         return
     if options.as_json:
         print_json(ghost_data(table, options.brightest) | ({} if veil is None else {"veiling_glare": asdict(veil)}))
@@ -292,7 +292,7 @@ def ghost_data(table: GhostTable, brightest: int | None = None) -> dict[str, Any
     }
 
 
-def ghost_csv(table: GhostTable, brightest: int | None = None) -> str:
+def table_csv(table: GhostTable, brightest: int | None = None) -> str:
     """Return the analysis as comma-separated values: a header, the direct image, then the ghosts as in `ghost_data`.
 
     Parameters

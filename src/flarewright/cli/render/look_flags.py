@@ -14,7 +14,7 @@ from .options.record import RenderOptions
 from .project_flags import flag_lights
 
 
-def put_look(flags: RenderOptions, name: str) -> tuple[RenderOptions, frozenset[str], tuple[str, ...]]:
+def flags_with_look(flags: RenderOptions, name: str) -> tuple[RenderOptions, frozenset[str], tuple[str, ...]]:
     """Apply a look below the flags: to their lens and lights, to those of their project, or to the look's own.
 
     Parameters

@@ -161,7 +161,7 @@ def _without_effect(flags: RenderOptions, files: Sequence[TrackFile]) -> list[st
     return remarks
 
 
-def placed(
+def with_pixel_lights(
     project: Project, flags: RenderOptions, first: int, counted_px: tuple[int, int], *, over_time: bool = False
 ) -> tuple[Project, list[str]]:
     """Return a project whose lights of `--light-px` lie at their pixels, and remarks.

@@ -6,7 +6,7 @@ Public entry points: `candidate.outcomes`, `candidate.nearest_outcomes`, `lens_e
 - `candidate`: `Outcome` and `outcomes`: the best distinct lenses of a search, polished
 - `constraints`: hard constraints: `breaches` measures violations, `keeps_limits` removes them
 - `glass_rounding`: `with_catalogue_glasses` replaces free indices by catalogue glasses
-- `null_space`: among lenses with the same ghosts, `same_ghosts` and `to_the_middle` choose the most moderate
+- `null_space`: `lenses_with_same_ghosts`, and `to_the_middle`, which chooses the most moderate of them
 - `traced`: `traced_ghosts`: place and size of ghosts by traced rays
 - `traced_polish`: `finish` moves traced ghosts closer to their targets
 - `lens_edits`: direct changes of a lens without a search

@@ -22,7 +22,7 @@ from ..solvers.polish import finer, finest, merge_pools
 from ..solvers.pool_search import KEPT, PoolState
 from .constraints import Breach, breaches, keeps_limits, stiff
 from .glass_rounding import held_indices, with_catalogue_glasses
-from .null_space import same_ghosts, to_the_middle
+from .null_space import lenses_with_same_ghosts, to_the_middle
 from .traced_polish import finish, traced_misfits
 
 # lenses whose variables differ by less than this on average count as one: log lengths, curvatures (1/mm), indices
@@ -165,7 +165,7 @@ def outcomes(
         pool = list(merge_pools(pool, run.members, KEPT))
     pool.sort(key=lambda one: one.cost)
     # where the targets are met, lenses with the same ghosts come before those that only come close
-    pool[:1] = same_ghosts(problem, pool[0], seed=state.seed, over=over) if count > 1 and pool else pool[:1]
+    pool[:1] = lenses_with_same_ghosts(problem, pool[0], seed=state.seed, over=over) if count > 1 and pool else pool[:1]
     if problem.traced:
         pool = _by_tracing(pool, problem, over)
     # the best lens with free indices need not be the best with glasses

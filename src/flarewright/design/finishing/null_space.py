@@ -40,7 +40,7 @@ def moderation(known: Variables, x: Floats) -> float:
     return float((_off_middle(known, x[known.free]) ** 2).sum())
 
 
-def same_ghosts(
+def lenses_with_same_ghosts(
     problem: Problem, solved: LensCandidate, *, seed: int = 0, over: Over = never
 ) -> tuple[LensCandidate, ...]:
     """Find lenses of several structures with the same ghosts as a lens that meets its targets.

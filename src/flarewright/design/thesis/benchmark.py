@@ -10,7 +10,7 @@ import numpy as np
 from ...model.project.design import Bounds
 from ...render.scene.resolve import open_lens
 from ...typing import Floats
-from ..finishing.null_space import same_ghosts
+from ..finishing.null_space import lenses_with_same_ghosts
 from ..problem.from_scratch import random_ghost_targets, scratch_project, wanted_picture
 from ..problem.grey_picture import GAIN, OWN_STOP, grey_picture, psnr, psnr_with_gain, ssim
 from ..problem.objective import diagonal_slope, fitness, fitness_thesis, own_objective
@@ -213,7 +213,7 @@ def _best(problem: Problem, solution: Solution, solver: Choice) -> LensCandidate
         return solution.steps[-1].best
     assert solution.state.best is not None
     fine = finer(problem)
-    return same_ghosts(fine, finest(fine, solution.state.best, 4 * STEPS), seed=solution.state.seed)[0]
+    return lenses_with_same_ghosts(fine, finest(fine, solution.state.best, 4 * STEPS), seed=solution.state.seed)[0]
 
 
 def _trace(problem: Problem, solution: Solution) -> tuple[TracePoint, ...]:

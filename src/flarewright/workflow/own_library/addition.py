@@ -37,7 +37,7 @@ from ...model import Lens, Surface
 from ...optics.lens_import.patent_repair import Apertures
 from ...render.scene.resolve import open_lens
 from ...typing import Progress
-from .lens_record import record_of
+from .lens_record import record_of_lens
 from .own_lenses import kept_record, library_lock, own_library
 
 _PICTURE_DIGITS = 16
@@ -187,7 +187,7 @@ def _read(file: LensFile, data: bytes, digest: str, reading: _Reading) -> tuple[
                     path, apertures=reading.apertures if file.suffix == ".lens" else "auto",
                     first_column=reading.first_column if file.suffix == ".seq" else None,
                 )  # fmt: skip
-                record = record_of(opened, file.stem, file.label, digest)
+                record = record_of_lens(opened, file.stem, file.label, digest)
                 lens = _with_own_pictures(opened.lens)
         except FlarewrightError as error:
             # the path of an unpacked file says nothing to the user

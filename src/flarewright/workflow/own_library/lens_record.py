@@ -12,7 +12,7 @@ from ...render.scene.resolve import OpenedLens, first_order, open_lens
 _LONGEST_TEXT = 600
 
 
-def record_of(opened: OpenedLens, name: str, file: str = "", digest: str = "") -> LensRecord:
+def record_of_lens(opened: OpenedLens, name: str, file: str = "", digest: str = "") -> LensRecord:
     """Return what a library knows of a lens.
 
     Parameters
@@ -49,4 +49,4 @@ def _short(text: str) -> str:
 
 def shipped_records() -> tuple[LensRecord, ...]:
     """Return what is known of the shipped lenses."""
-    return tuple(record_of(open_lens(name), name) for name in library_names())
+    return tuple(record_of_lens(open_lens(name), name) for name in library_names())

@@ -86,11 +86,11 @@ def _made_again(name: str, path: Path) -> LensRecord:
     """Make the record of a lens file that was edited or put into the folder by hand."""
     # most lists need no lens, and what opens one takes longer to import than an index to read
     from ...render.scene.resolve import open_lens
-    from .lens_record import record_of
+    from .lens_record import record_of_lens
 
     before, _ = record_in(read_text(path, "a lens file"), name)
     with sentences_for(path, "a lens"):
-        made = record_of(open_lens(path), name)
+        made = record_of_lens(open_lens(path), name)
     return made if before is None else replace(made, file=before.file, digest=before.digest, maker=before.maker)
 
 

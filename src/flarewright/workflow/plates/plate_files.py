@@ -20,7 +20,7 @@ from ...plates.settings import PlateSettings
 from ...typing import Pixels
 
 
-def is_still(settings: PlateSettings) -> bool:
+def is_picture(settings: PlateSettings) -> bool:
     """Return whether all frames have the same picture and matte."""
     names = [settings.files, *([] if settings.matte is None else [settings.matte])]
     return not is_film(settings.files) and not any(FramePattern(name).numbered for name in names)

@@ -30,7 +30,7 @@ from ...plates.measured_plate import measured_pixels
 from ...plates.settings import PlateSettings
 from ...plates.tracking import SourceTrackSettings, follow, steady
 from ...typing import Floats
-from .plate_files import is_still, plate_digest, plate_matte, plate_name, plate_picture
+from .plate_files import is_picture, plate_digest, plate_matte, plate_name, plate_picture
 
 # frames whose mean sets a threshold in stops
 _MEAN_FRAMES = 24
@@ -171,7 +171,7 @@ def plate_shot(
         The plates cannot be read, differ in size, or have no source at all.
     """
     first = plate_picture(settings, frames[0])
-    still = is_still(settings)
+    still = is_picture(settings)
     threshold, remarks = _threshold(settings, frames[:1] if still else frames, first)
     search = _Search(settings, threshold, first.size_px)
     # one picture for all frames is searched once

@@ -104,7 +104,7 @@ def _pick(number: int, weights: tuple[float, ...] | None, rng: np.random.Generat
     return int(np.searchsorted(edges, rng.uniform(0.0, edges[-1]), side="right").clip(0, number - 1))
 
 
-def lens_of(spec: DatasetSpec, index: int) -> str:
+def drawn_lens(spec: DatasetSpec, index: int) -> str:
     """Return the name of an item's lens, which decides its split."""
     return draw_text(spec.lens.names, stream(spec, index, LENS))
 

@@ -12,7 +12,7 @@ from ...io.files.tar_members import members, tar_member
 from ...io.files.text_file import read_bytes
 from ...jobs.worker import WRITING
 from ...model.project.dataset import DatasetSpec
-from .draw import lens_of, splits_of
+from .draw import drawn_lens, splits_of
 from .layout import item_files, key_of, name_of, read_record
 from .pictures import draw_pictures
 
@@ -81,7 +81,7 @@ def write_item(plan: DatasetPlan, index: int, threads: int | None = None) -> Ite
         The item cannot be drawn or written; the sentence names it.
     """
     spec = plan.spec
-    split = splits_of(spec)[lens_of(spec, index)]
+    split = splits_of(spec)[drawn_lens(spec, index)]
     if item_record(plan, index, split) is not None:
         return ItemResult(index, split, False)
     try:

@@ -25,7 +25,7 @@ from ...model import Project
 from ...model.project.dataset import SPLITS, DatasetSpec
 from ...render.scene.resolve import open_lens
 from .background import list_backgrounds
-from .draw import check_lenses, draw_item, lens_of, splits_of
+from .draw import check_lenses, draw_item, drawn_lens, splits_of
 from .item import DatasetPlan, ItemResult, fragment, item_record, write_item
 from .layout import read_record
 
@@ -213,7 +213,7 @@ def _digest(spec: DatasetSpec, backgrounds: Sequence[str]) -> str:
 
 
 def _split(spec: DatasetSpec, index: int) -> str:
-    return splits_of(spec)[lens_of(spec, index)]
+    return splits_of(spec)[drawn_lens(spec, index)]
 
 
 def _units(spec: DatasetSpec, items: int) -> list[range]:

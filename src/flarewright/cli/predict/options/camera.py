@@ -11,7 +11,7 @@ PANEL = "Camera"
 
 
 @dataclass(frozen=True, kw_only=True)
-class CameraOptions:
+class PredictCameraOptions:
     """The lens and the camera. None: not given."""
 
     fstop: Annotated[float | None, typer.Option(help="f-number (default: wide open).", rich_help_panel=PANEL)] = None
