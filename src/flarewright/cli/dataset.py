@@ -121,17 +121,10 @@ def _draw(settings: DatasetSpec, output: Path, options: DatasetOptions) -> None:
     started = time.monotonic()
     with _progress() as report:
         result = draw(
-            settings,
-            output,
-            items=100 if options.items is None else options.items,
-            chunk=options.chunk,
-            processes=options.processes,
-            threads=options.threads,
-            report=report,
-            prepare=_compile,
-            cluster=options.cluster,
-            announce=print_remark,
-        )
+            settings, output, items=100 if options.items is None else options.items, chunk=options.chunk,
+            processes=options.processes, threads=options.threads, cluster=options.cluster, prepare=_compile,
+            report=report, announce=print_remark,
+        )  # fmt: skip
     seconds = time.monotonic() - started
     print_remarks(result.remarks)
     if options.as_json:

@@ -14,19 +14,7 @@ from ...errors import OutputError, ProjectError
 from ..common import print_json, print_remark, print_remarks, stop_on_interrupt
 from ..shared_options import Json
 from .checks import check_fitness, check_time
-from .options import (
-    Cluster,
-    Fitness,
-    Lenses,
-    Output,
-    Processes,
-    Restarts,
-    Searches,
-    Seed,
-    Solver,
-    Threads,
-    Time,
-)
+from .options import Cluster, Fitness, Lenses, Output, Processes, Restarts, Searches, Seed, Solver, Threads, Time
 
 if TYPE_CHECKING:
     from ...design.finishing.constraints import Breach

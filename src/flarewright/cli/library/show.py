@@ -13,8 +13,7 @@ EPILOG = "Its rows and pupils: flarewright lens show NAME"
 
 
 def show(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="A lens of your library.")],
-    as_json: Json = False,
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A lens of your library.")], as_json: Json = False
 ) -> None:
     """Show where a lens of your library came from, what its reader repaired, and where its file is."""
     from ...io.lens.own.record import as_json as record_json

@@ -16,10 +16,7 @@ if TYPE_CHECKING:
     from ...render.scene.resolve import ResolvedProject
 
 
-def check(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A project file.")],
-    as_json: Json = False,
-) -> None:
+def check(file: Annotated[Path, typer.Argument(metavar="FILE", help="A project file.")], as_json: Json = False) -> None:
     """Check a project and its lens, and list all errors; exit code 2 if it cannot be rendered."""
     from ...io.project.project_file import read_project
     from ...measure.replay.measured_project import is_measured

@@ -12,10 +12,7 @@ from ..common import errors_as_json, print_json
 from ..shared_options import Json
 
 
-def check(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A scene file.")],
-    as_json: Json = False,
-) -> None:
+def check(file: Annotated[Path, typer.Argument(metavar="FILE", help="A scene file.")], as_json: Json = False) -> None:
     """Check a scene, and list all errors; exit code 2 if it cannot be used."""
     from ...io.files.sentences import count, summary
     from ...io.project.scene_file import read_scene

@@ -57,29 +57,13 @@ def shot(options: ShotOptions) -> None:
     started = time.monotonic()
     with _progress() as (report, searched, encoded):
         result = draw(
-            project,
-            options.output,
-            frames=options.frames,
-            shutter_deg=options.shutter,
-            subframes=options.subframes,
-            parts=parts,
-            cropped=options.cropped,
-            chunk=options.chunk,
-            processes=options.processes,
-            threads=options.threads,
-            report=report,
-            prepare=_compile,
-            plate=plate,
-            over=options.over,
-            searched=searched,
-            movie=options.movie,
-            movie_view=options.view,  # type: ignore[arg-type]
-            movie_exposure=options.exposure,
-            encoded=encoded,
-            cluster=options.cluster,
-            announce=print_remark,
-            radiance=options.radiance,
-        )
+            project, options.output, frames=options.frames, shutter_deg=options.shutter, subframes=options.subframes,
+            parts=parts, cropped=options.cropped, radiance=options.radiance, plate=plate, over=options.over,
+            movie=options.movie, movie_view=options.view,  # type: ignore[arg-type]
+            movie_exposure=options.exposure, chunk=options.chunk, processes=options.processes,
+            threads=options.threads, cluster=options.cluster, prepare=_compile, report=report, searched=searched,
+            encoded=encoded, announce=print_remark,
+        )  # fmt: skip
     seconds = time.monotonic() - started
     remarks = [*remarks, *result.remarks]
     print_remarks(remarks)
@@ -97,15 +81,11 @@ def _data(result: ShotResult, project: Project, seconds: float) -> dict[str, Any
             {"frame": frame.frame, "file": frame.file, "drawn": frame.drawn, "subframes": frame.subframes}
             for frame in result.frames
         ],
-        "drawn": drawn,
-        "kept": len(result.frames) - drawn,
-        "processes": result.processes,
-        "seconds": round(seconds, 3),
-        "fps": project.timeline.fps,
-        "start": project.timeline.start,
+        "drawn": drawn, "kept": len(result.frames) - drawn, "processes": result.processes,
+        "seconds": round(seconds, 3), "fps": project.timeline.fps, "start": project.timeline.start,
         **({} if result.plate is None else {"plate": _plate_data(result.plate)}),
         **({} if result.movie is None else {"movie": film_data(result.movie)}),
-    }
+    }  # fmt: skip
 
 
 def _print(result: ShotResult, seconds: float) -> None:
