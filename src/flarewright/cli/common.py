@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import FlarewrightError, OutputError, ProjectError
 from ..workflow.checkpoints import checkpoints
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from ..io.lens.own.record import LensRecord
     from ..optics.lens_import.patent_repair import Apertures
     from ..typing import Progress
+
+Word = TypeVar("Word", bound=str)
 
 FIRST_COLUMN_HELP = "Read the first column of .seq files without RDM as radii or curvatures."
 APERTURES_HELP = "Read the last column of .lens tables as diameters or semi-diameters (default: by the f-number)."
@@ -92,22 +94,31 @@ def print_remark(remark: str) -> None:
     print(f"flarewright: {remark}", file=sys.stderr)
 
 
+def one_of(flag: str, text: str, known: tuple[Word, ...]) -> Word:
+    """Return the value of an option that takes one of a few words.
+
+    Raises
+    ------
+    ProjectError
+        When it is another one.
+    """
+    for word in known:
+        if word == text:
+            return word
+    raise ProjectError(f"{flag} {text!r} is unknown; choose {' or '.join(known)}")
+
+
 def aperture_reading(text: str | None) -> Apertures:
     """Return the reading of the last column of a `.lens` table that `--apertures` chooses."""
-    match text:
-        case None:
-            return "auto"
-        case "diameters" | "semi-diameters":
-            return text
-    raise ProjectError(f"--apertures {text!r} is unknown; choose diameters or semi-diameters")
+    return "auto" if text is None else one_of("--apertures", text, ("diameters", "semi-diameters"))
 
 
 def first_column_reading(text: str | None) -> FirstColumn | None:
     """Return the reading of the first column of a `.seq` file that `--first-column` chooses."""
-    match text:
-        case None | "radii" | "curvatures":
-            return text
-    raise ProjectError(f"--first-column {text!r} is unknown; choose radii or curvatures")
+    if text is None:
+        return None
+    column: FirstColumn = one_of("--first-column", text, ("radii", "curvatures"))
+    return column
 
 
 def print_json(data: dict[str, Any]) -> None:

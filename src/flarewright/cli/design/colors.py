@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ...errors import ProjectError
-from ..common import check_place, console, print_json, print_remarks, stop_on_interrupt
+from ..common import check_place, console, one_of, print_json, print_remarks, stop_on_interrupt
 from ..option_record import with_options
 from ..shared_options import Json, Threads
 from .checks import check_color_fitness, check_films, check_time
@@ -78,8 +78,7 @@ def colors(options: ColorOptions) -> None:
     Finished descents are kept beside the output: after an interruption, the same command continues.
     """
     kind, layers = check_films(options.films)
-    if options.judge not in ("linear", "oklab"):
-        raise ProjectError(f"--judge {options.judge!r} is unknown; choose linear or oklab")
+    judge = one_of("--judge", options.judge, ("linear", "oklab"))
     measure = check_color_fitness(options.fitness)
     check_time(60.0 if options.time_s is None else options.time_s)
     check_place(options.output, ".toml")
@@ -89,7 +88,7 @@ def colors(options: ColorOptions) -> None:
 
     choice = chosen(options.solver)
     given = read_project(options.project)
-    problem, lens = color_problem(given, kind, perceptual=options.judge == "oklab", layers=layers)
+    problem, lens = color_problem(given, kind, perceptual=judge == "oklab", layers=layers)
     _check_drawings(options, problem)
     found, cut_off = _search(options, given, problem, lens, choice, measure)
     remarks = [f"wrote {options.output}", *(["ended early; to resume: the same command"] if cut_off else [])]

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from ...errors import ProjectError
-from ..common import check_place, chosen_fstop, console, print_remarks
+from ..common import check_place, chosen_fstop, console, one_of, print_remarks
 from ..shared_options import FNumber, KnownLens
 
 Output = Annotated[Path, typer.Option("-o", "--output", metavar="LENS.toml", help="The changed lens.")]
@@ -28,10 +28,8 @@ def resize(
 ) -> None:
     """Resize one ghost by the radius of a mirror, or all by an opening, and list the effect on all ghosts."""
     check_place(output, ".toml")
-    if mirror not in ("first", "second"):
-        raise ProjectError(f"--mirror {mirror!r} is unknown; choose first or second")
-    if every not in (None, "stop", "entrance"):
-        raise ProjectError(f"--all {every!r} is unknown; choose stop or entrance")
+    which: Literal["first", "second"] = one_of("--mirror", mirror, ("first", "second"))
+    opening: Literal["stop", "entrance"] = "stop" if every is None else one_of("--all", every, ("stop", "entrance"))
     if (ghost is None) == (every is None):
         raise ProjectError("no ghost given; give --ghost J-I for one, or --all stop or --all entrance for all")
     if not 0.0 < height < 1000.0:
@@ -44,11 +42,10 @@ def resize(
     from ...io.lens.lens_writer import write_lens
     from ...render.scene.resolve import open_lens
 
-    which: Literal["first", "second"] = "second" if mirror == "second" else "first"
     if pair is not None:
         done = resize_ghost(open_lens(lens).lens, pair, height, mirror=which, f_number=f_number)
     else:
-        done = resize_all(open_lens(lens).lens, height, by="stop" if every == "stop" else "entrance", f_number=f_number)
+        done = resize_all(open_lens(lens).lens, height, by=opening, f_number=f_number)
     write_lens(done.lens, output)
     print_remarks([f"wrote {output}: row {done.row} has a new {'diameter' if pair is None else 'curvature'}"])
     out = Table(title="Place in mm per unit slope of the light, radius in mm", caption="Negative radius: inverted.")

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ...errors import ProjectError
-from ..common import first_run_bar, print_json, print_remark, print_remarks, progress_bar
+from ..common import first_run_bar, one_of, print_json, print_remark, print_remarks, progress_bar
 from ..option_record import with_options
 from ..progress_lines import ProgressLines, print_line
 from .command import keep_inputs, project_of_options
@@ -47,7 +47,7 @@ def shot(options: ShotOptions) -> None:
     from ...workflow.shot import shot as draw
     from .plate_flags import plate_settings
 
-    parts = _parts(options.parts)
+    parts: Parts = "multi" if options.parts is None else one_of("--parts", options.parts, ("multi", "single"))
     _check_movie(options)
     if options.project is not None:
         options = replace(options, base=read_project(options.project))
@@ -106,15 +106,6 @@ def _check_movie(options: ShotOptions) -> None:
         if value is not None and options.movie is None:
             raise ProjectError(f"{flag} is for the film, and none is made; add --movie FILM.mp4, or omit {flag}")
     check_film_look(options.view, options.exposure)
-
-
-def _parts(text: str | None) -> Literal["multi", "single"]:
-    match text:
-        case None | "multi":
-            return "multi"
-        case "single":
-            return "single"
-    raise ProjectError(f"--parts {text!r} is unknown; choose multi or single")
 
 
 def _project(options: ShotOptions, plate: PlateSettings | None) -> tuple[Project, list[str]]:
@@ -259,6 +250,7 @@ def _compile(project: Project, threads: int) -> None:
         compile_for_render(project, threads, print_remark, first_run_bar)
 
 
+Parts = Literal["multi", "single"]
 _Report = Callable[["FrameResult", int, int], None]
 _Searched = Callable[[int, int, int], None]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import ProjectError
-from ..common import first_run_bar, one_bar, pair, picture_size, print_remark
+from ..common import first_run_bar, one_bar, one_of, pair, picture_size, print_remark
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,10 +39,10 @@ class GivenTrack:
 
 def px_origin(text: str | None) -> Origin | None:
     """Return the corner of `--px-origin`."""
-    match text:
-        case None | "top-left" | "bottom-left":
-            return text
-    raise ProjectError(f"--px-origin {text!r} is unknown; choose top-left or bottom-left")
+    if text is None:
+        return None
+    corner: Origin = one_of("--px-origin", text, ("top-left", "bottom-left"))
+    return corner
 
 
 def pixel_place(text: str) -> tuple[float, float]:
