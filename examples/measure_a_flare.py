@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 
 import flarewright as fw
-from flarewright.io.measurement.captures import read_captures
 from flarewright.io.measurement.ghost_model_file import read_ghost_model
-from flarewright.measure import merge_captures, replay_model
-from flarewright.workflow import run_stages
+from flarewright.measure import replay_model
+from flarewright.workflow import merge_photographs, run_stages
 
 SIZE, SENSOR_MM = (120, 80), (36.0, 24.0)
 ANGLES_DEG, LEFT_OUT_DEG = (2.0, 5.0, 8.0, 11.0, 14.0, 17.0, 20.0), 12.5
@@ -60,7 +59,7 @@ def main(folder: Path) -> None:
     """Measure the flare and print how well its model replays."""
     captures = photograph(folder / "photographs")
     run = folder / "run"
-    merge_captures(read_captures(captures), captures.parent, run)
+    merge_photographs(captures, run)
     for result in run_stages(run, ("find", "fit"), residual=False):
         print(f"{result.stage}: {result.counts['ghosts']} ghosts in {result.file.name}")
     model = read_ghost_model(run / "model.json")
