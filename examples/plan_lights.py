@@ -3,14 +3,8 @@
 Usage: python plan_lights.py
 """
 
-from functools import partial
-
-import numpy as np
-
 from flarewright.model.project.scene import Scene
-from flarewright.predict.plan import plan_scene, ranking
-from flarewright.predict.switching import choose_cameras
-from flarewright.workflow.lens_flares import scene_flare
+from flarewright.workflow import predict_scene
 
 SCENE = {
     "luminance_cd_m2": (1.0, 500.0),
@@ -34,15 +28,13 @@ SCENE = {
 def main() -> None:
     """Print the ranking and the order of shots."""
     scene = Scene.model_validate(SCENE)
-    maker = partial(scene_flare, quality="draft", shown=False, threads=None)
-    plan = plan_scene(scene, maker, lambda _name: lambda _part, _words: None)
-    for one in ranking(plan):
+    found = predict_scene(scene, quality="draft")
+    for one in found.ranked:
         camera, light = scene.cameras[one.camera].name, scene.lights[one.light].name
         print(f"{light} in {camera}: mean veil {one.mean_veil_cd_m2:.3g} cd/m2, worst {one.worst_veil_cd_m2:.3g}")
-    veils = [plan.veil(camera) for camera in range(len(scene.cameras))]
-    for shot in choose_cameras(np.array(veils), plan.times_s, 0.0):
-        first, until = plan.times_s[shot.first], plan.times_s[shot.until]
-        print(f"{first:g} to {until:g} s: {scene.cameras[shot.camera].name}")
+    times = found.plan.times_s
+    for shot in found.shots:
+        print(f"{times[shot.first]:g} to {times[shot.until]:g} s: {scene.cameras[shot.camera].name}")
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ The command line and other front ends call these functions; nothing here prints.
 - `measured_flares`: `model_flares` builds them from a measured model
 - `measured_camera`: `model_in_scene` does so for a camera of a scene; `model_errors` finds its errors
 - `project_files`: `open_project_files` opens all files of a project and collects the errors
+- `scene_prediction`: `predict_scene` predicts all lights in all cameras of a scene, ranked, with shots
 - `scene_check`: `camera_errors` and `light_errors` find the errors of a scene
 - `keyframes`: `project_at`, a project with the values of its keyframes and curves at a time
 - `light_places`: `lights_at_pixels` and `with_tracks`, lights whose places are given in pixels
@@ -51,6 +52,9 @@ if TYPE_CHECKING:
     from .measure_run import StageResult as StageResult
     from .measure_run import run_stages as run_stages
     from .project_files import open_project_files as open_project_files
+    from .scene_prediction import NearbySearch as NearbySearch
+    from .scene_prediction import ScenePrediction as ScenePrediction
+    from .scene_prediction import predict_scene as predict_scene
     from .searches.lens_search import LensSearch as LensSearch
     from .searches.lens_search import search_lenses as search_lenses
     from .searches.search_folder import SearchLimits as SearchLimits
@@ -67,6 +71,7 @@ __all__, __getattr__, __dir__ = lazy_names(
         ".measure_provenance": ("STAGES",),
         ".measure_run": ("StageResult", "run_stages"),
         ".project_files": ("open_project_files",),
+        ".scene_prediction": ("NearbySearch", "ScenePrediction", "predict_scene"),
         ".searches.lens_search": ("LensSearch", "search_lenses"),
         ".searches.search_folder": ("SearchLimits", "search_in_folder"),
         ".shot": ("ShotResult",),

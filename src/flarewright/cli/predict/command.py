@@ -23,7 +23,7 @@ from ..common import (
 )
 from ..option_record import with_options
 from .options.record import PredictOptions
-from .scene import SearchRoom, is_scene_file, predict_scene
+from .scene import is_scene_file, predict_and_print
 
 if TYPE_CHECKING:
     from ...model import Project
@@ -67,7 +67,8 @@ def predict(options: PredictOptions) -> None:
     unnamed = repr(replace(options, threads=None, processes=None, cluster=None))
     if is_scene_file(options.subject):
         _refuse(_given(options, _OF_LENS + _OF_MODEL + _OF_CURVES), "a scene", "the scene file sets it")
-        predict_scene(Path(options.subject), options, _search_room(options), unnamed)
+        _check_search(options)
+        predict_and_print(Path(options.subject), options, unnamed)
         return
     _refuse(_given(options, _OF_SCENE), "a lens or a measured flare", "give a scene file")
     wanted = _wanted(options)
@@ -165,21 +166,17 @@ def _refuse(flags: dict[str, Any], what: str, why: str) -> None:
             raise ProjectError(f"{flag} has no meaning for {what}: {why}; omit {flag}")
 
 
-def _search_room(options: PredictOptions) -> SearchRoom:
-    """Return where a scene is searched and how its cameras are switched, checked."""
-    room = SearchRoom(
-        5.0 if options.radius is None else options.radius, options.height or 0.0, options.shortest_shot or 0.0
-    )
+def _check_search(options: PredictOptions) -> None:
+    """Raise an error for limits of a search, or a time between switches of cameras, that are none."""
     for flag, value, least in (
-        ("--radius", room.radius_m, 1e-6), ("--height", room.height_m, 0.0),
-        ("--shortest-shot", room.shortest_shot_s, 0.0),
+        ("--radius", options.radius, 1e-6), ("--height", options.height, 0.0),
+        ("--shortest-shot", options.shortest_shot, 0.0),
     ):  # fmt: skip
-        if not least <= value < 1e6:
+        if value is not None and not least <= value < 1e6:
             raise ProjectError(f"{flag} {value:g} is out of range; give a number of {'s' if 'shot' in flag else 'm'} "
                                f"{'of at least' if least == 0.0 else 'above'} 0")  # fmt: skip
     if options.near is None and (options.radius or options.height):
         raise ProjectError("--radius and --height limit the search for a position; add --near CAMERA")
-    return room
 
 
 def _wanted(options: PredictOptions) -> Wanted:
