@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-PANEL = "Output"
+option = partial(typer.Option, rich_help_panel="Output")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,50 +17,27 @@ class LayerOptions:
     """Which layers are written, and in what form. None or empty: not given."""
 
     layers: Annotated[
-        str | None,
-        typer.Option(
-            help="Layers: beauty; passes: also starburst, ghosts; ghosts: also each ghost.", rich_help_panel=PANEL
-        ),
+        str | None, option(help="Layers: beauty; passes: also starburst, ghosts; ghosts: also each ghost.")
     ] = None
-    brightest: Annotated[
-        int | None,
-        typer.Option(help="Largest number of single ghosts to write, brightest first.", rich_help_panel=PANEL),
-    ] = None
-    matte: Annotated[
-        str | None,
-        typer.Option(help="ghosts: also a Cryptomatte that picks single ghosts; none: default.", rich_help_panel=PANEL),
-    ] = None
+    brightest: Annotated[int | None, option(help="Largest number of single ghosts to write, brightest first.")] = None
+    matte: Annotated[str | None, option(help="ghosts: also a Cryptomatte that picks single ghosts; none: default.")] = (
+        None
+    )
     matte_ranks: Annotated[
-        int | None,
-        typer.Option(help="Ghosts a pixel in the Cryptomatte, an even number (default: 8).", rich_help_panel=PANEL),
+        int | None, option(help="Ghosts a pixel in the Cryptomatte, an even number (default: 8).")
     ] = None
-    no_starburst: Annotated[
-        bool, typer.Option("--no-starburst", help="Omit the light's direct image.", rich_help_panel=PANEL)
-    ] = False
+    no_starburst: Annotated[bool, option("--no-starburst", help="Omit the light's direct image.")] = False
     colorspace: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME", help="Linear colour space: rec709 (default), acescg, or a name or role of OpenColorIO.",
-            rich_help_panel=PANEL,
-        ),
-    ] = None  # fmt: skip
+        option(metavar="NAME", help="Linear colour space: rec709 (default), acescg, or a name or role of OpenColorIO."),
+    ] = None
     ocio: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="OpenColorIO configuration of --colorspace (default: OCIO, or the built-in one).",
-            rich_help_panel=PANEL,
-        ),
-    ] = None  # fmt: skip
-    gamut: Annotated[
-        str | None, typer.Option(help="keep negative channels (default), or compress colours.", rich_help_panel=PANEL)
+        option(metavar="FILE", help="OpenColorIO configuration of --colorspace (default: OCIO, or the built-in one)."),
     ] = None
-    half: Annotated[bool, typer.Option("--half", help="Write 16 bits per value (default).", rich_help_panel=PANEL)] = (
-        False
-    )
-    float32: Annotated[
-        bool, typer.Option("--float", help="Write 32 bits per value, unscaled irradiances.", rich_help_panel=PANEL)
-    ] = False
+    gamut: Annotated[str | None, option(help="keep negative channels (default), or compress colours.")] = None
+    half: Annotated[bool, option("--half", help="Write 16 bits per value (default).")] = False
+    float32: Annotated[bool, option("--float", help="Write 32 bits per value, unscaled irradiances.")] = False
     compression: Annotated[
-        str | None,
-        typer.Option(help="Compression of the EXR: zip, lossless (default), or dwaa, lossy.", rich_help_panel=PANEL),
+        str | None, option(help="Compression of the EXR: zip, lossless (default), or dwaa, lossy.")
     ] = None

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Annotated
 
 import typer
 
-PANEL = "Places of lights"
+option = partial(typer.Option, rich_help_panel="Places of lights")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,64 +17,47 @@ class PlaceOptions:
 
     light_px: Annotated[
         list[str],
-        typer.Option(
+        option(
             metavar="X,Y",
             help="A light whose direct image lies at this pixel, or sun@X,Y; may be repeated, behind those of --light.",
-            rich_help_panel=PANEL,
         ),
     ] = field(default_factory=list)
     px_origin: Annotated[
         str | None,
-        typer.Option(
-            metavar="CORNER",
-            help="Corner from which pixels count: top-left (default) or bottom-left, as in Nuke.",
-            rich_help_panel=PANEL,
-        ),
+        option(metavar="CORNER", help="Corner from which pixels count: top-left (default) or bottom-left, as in Nuke."),
     ] = None
     sun: Annotated[
         str | None,
-        typer.Option(
+        option(
             metavar="WHEN,LAT,LON",
             help="The sun at a time and place, 2024-06-21T18:00+02:00,48.14,11.58 (degrees north and east).",
-            rich_help_panel=PANEL,
         ),
     ] = None
     heading: Annotated[
-        float | None,
-        typer.Option(help="With --sun: where the camera looks, degrees clockwise from north.", rich_help_panel=PANEL),
+        float | None, option(help="With --sun: where the camera looks, degrees clockwise from north.")
     ] = None
-    tilt: Annotated[
-        float | None, typer.Option(help="With --sun: degrees above the horizon (default: 0).", rich_help_panel=PANEL)
-    ] = None
-    roll: Annotated[
-        float | None,
-        typer.Option(help="With --sun: degrees by which the camera leans right (default: 0).", rich_help_panel=PANEL),
-    ] = None
+    tilt: Annotated[float | None, option(help="With --sun: degrees above the horizon (default: 0).")] = None
+    roll: Annotated[float | None, option(help="With --sun: degrees by which the camera leans right (default: 0).")] = (
+        None
+    )
     track: Annotated[
         list[str],
-        typer.Option(
+        option(
             metavar="[LIGHT=]FILE",
             help="Path of a light in pixels: CSV, Nuke, After Effects, SynthEyes, 3DEqualizer, Blender, USD; LIGHT is "
             "an index, a name or new.",
-            rich_help_panel=PANEL,
         ),
     ] = field(default_factory=list)
     track_format: Annotated[
         str | None,
-        typer.Option(
+        option(
             metavar="NAME",
             help="csv, nuke, nuke-ascii, after-effects, syntheyes, 3de, blender or usd (default: by contents).",
-            rich_help_panel=PANEL,
         ),
     ] = None
     track_size: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WxH", help="Size of the picture in which tracks count (default: that of the shot).",
-            rich_help_panel=PANEL,
-        ),
-    ] = None  # fmt: skip
-    track_offset: Annotated[
-        float | None,
-        typer.Option(metavar="FRAMES", help="Frames to add to the frames of tracks.", rich_help_panel=PANEL),
+        str | None, option(metavar="WxH", help="Size of the picture in which tracks count (default: that of the shot).")
     ] = None
+    track_offset: Annotated[float | None, option(metavar="FRAMES", help="Frames to add to the frames of tracks.")] = (
+        None
+    )

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated
 
 import typer
 
-PANEL = "Quality"
+option = partial(typer.Option, rich_help_panel="Quality")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,39 +17,25 @@ class QualityOptions:
 
     quality: Annotated[
         str | None,
-        typer.Option(
-            help="draft: matrices, milliseconds; final: traced rays; reference: Monte Carlo, all orders, with errors.",
-            rich_help_panel=PANEL,
+        option(
+            help="draft: matrices, milliseconds; final: traced rays; reference: Monte Carlo, all orders, with errors."
         ),
     ] = None
     wavelengths: Annotated[
-        int | None,
-        typer.Option(help="Number of traced wavelengths: 3 for a draft, 7 to 31 for final.", rich_help_panel=PANEL),
+        int | None, option(help="Number of traced wavelengths: 3 for a draft, 7 to 31 for final.")
     ] = None
-    paths: Annotated[
-        str | None, typer.Option(help="Ghost paths: all, or same-side of the stop.", rich_help_panel=PANEL)
-    ] = None
+    paths: Annotated[str | None, option(help="Ghost paths: all, or same-side of the stop.")] = None
     ringing: Annotated[
         str | None,
-        typer.Option(
+        option(
             help="Rings inside ghosts, final quality: collins, exact paraxial diffraction (default); frft, Hullin's "
-            "estimate; off.",
-            rich_help_panel=PANEL,
+            "estimate; off."
         ),
     ] = None
     threads: Annotated[
-        int | None,
-        typer.Option(
-            min=1, help="Number of threads, without effect on pixels (default: all cores).", rich_help_panel=PANEL
-        ),
+        int | None, option(min=1, help="Number of threads, without effect on pixels (default: all cores).")
     ] = None
-    orders: Annotated[
-        int | None,
-        typer.Option(help="Reflections: 4 also draws ghosts of four (final; default: 2).", rich_help_panel=PANEL),
-    ] = None
+    orders: Annotated[int | None, option(help="Reflections: 4 also draws ghosts of four (final; default: 2).")] = None
     order4_limit: Annotated[
-        float | None,
-        typer.Option(
-            help="Draw those above this fraction of the two-reflection light (default: 1e-4).", rich_help_panel=PANEL
-        ),
+        float | None, option(help="Draw those above this fraction of the two-reflection light (default: 1e-4).")
     ] = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,7 +11,8 @@ import typer
 
 from .art import ArtOptions
 from .camera import CameraOptions
-from .layers import PANEL, LayerOptions
+from .layers import LayerOptions
+from .layers import option as output_option
 from .lens import LensOptions
 from .light import LightOptions
 from .place import PlaceOptions
@@ -18,9 +20,9 @@ from .plate import CompOptions, PlateFile, PlateOptions
 from .quality import QualityOptions
 from .starburst import StarburstOptions
 
-FRAMES = "Frames"
-MOVIE = "Film"
-WORK = "Processes"
+frame_option = partial(typer.Option, rich_help_panel="Frames")
+film_option = partial(typer.Option, rich_help_panel="Film")
+work_option = partial(typer.Option, rich_help_panel="Processes")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,28 +39,15 @@ class ShotInputs:
         str | None, typer.Option(metavar="NAME|FILE", help="One of `flarewright looks`; flags override it.")
     ] = None
     frames: Annotated[
-        str | None,
-        typer.Option(
-            metavar="A-BxS", help="1001-1240, 1001-1240x2 or 1,5,9-12 (default: to the last key).",
-            rich_help_panel=FRAMES,
-        ),
-    ] = None  # fmt: skip
-    fps: Annotated[
-        float | None, typer.Option(help="Frames per second (default: the project's, 24).", rich_help_panel=FRAMES)
+        str | None, frame_option(metavar="A-BxS", help="1001-1240, 1001-1240x2 or 1,5,9-12 (default: to the last key).")
     ] = None
-    start: Annotated[
-        int | None, typer.Option(help="Number of the frame at 0 s (default: the project's, 1).", rich_help_panel=FRAMES)
-    ] = None
+    fps: Annotated[float | None, frame_option(help="Frames per second (default: the project's, 24).")] = None
+    start: Annotated[int | None, frame_option(help="Number of the frame at 0 s (default: the project's, 1).")] = None
     shutter: Annotated[
-        float,
-        typer.Option(
-            metavar="DEGREES", help="Motion blur: 180 is open for half a frame (default: 0, none).",
-            rich_help_panel=FRAMES,
-        ),
-    ] = 0.0  # fmt: skip
+        float, frame_option(metavar="DEGREES", help="Motion blur: 180 is open for half a frame (default: 0, none).")
+    ] = 0.0
     subframes: Annotated[
-        int | None,
-        typer.Option(help="Moments averaged in a frame (default: one per pixel of motion).", rich_help_panel=FRAMES),
+        int | None, frame_option(help="Moments averaged in a frame (default: one per pixel of motion).")
     ] = None
 
 
@@ -67,12 +56,8 @@ class ShotFiles:
     """Where the frames are written."""
 
     output: Annotated[
-        str,
-        typer.Option(
-            "-o", "--output", metavar="NAME.####.exr", help="EXR files: ####, %04d or $F4 is the frame.",
-            rich_help_panel=PANEL,
-        ),
-    ]  # fmt: skip
+        str, output_option("-o", "--output", metavar="NAME.####.exr", help="EXR files: ####, %04d or $F4 is the frame.")
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,25 +66,22 @@ class MovieOptions:
 
     movie: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILM.mp4|FILM.mov", help="Also make a film of the comp, or of the flare: H.264 or ProRes.",
-            rich_help_panel=MOVIE,
+        film_option(
+            metavar="FILM.mp4|FILM.mov", help="Also make a film of the comp, or of the flare: H.264 or ProRes."
         ),
-    ] = None  # fmt: skip
+    ] = None
     view: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME", help="Of the film: filmic (default for a flare), srgb, rec709 (as a film plate), aces.",
-            rich_help_panel=MOVIE,
+        film_option(
+            metavar="NAME", help="Of the film: filmic (default for a flare), srgb, rec709 (as a film plate), aces."
         ),
-    ] = None  # fmt: skip
+    ] = None
     exposure: Annotated[
         float | None,
-        typer.Option(
-            metavar="STOPS", help="Of the film (default: automatic and the same for all frames; 0 for a comp).",
-            rich_help_panel=MOVIE,
+        film_option(
+            metavar="STOPS", help="Of the film (default: automatic and the same for all frames; 0 for a comp)."
         ),
-    ] = None  # fmt: skip
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,39 +89,24 @@ class ShotOutput(MovieOptions, LayerOptions, ShotFiles):
     """What is written, and by how many processes. None or empty: not given."""
 
     parts: Annotated[
-        str | None,
-        typer.Option(
-            help="multi: a part of the file per layer (default); single: one part with all.", rich_help_panel=PANEL
-        ),
+        str | None, output_option(help="multi: a part of the file per layer (default); single: one part with all.")
     ] = None
-    cropped: Annotated[
-        bool, typer.Option("--cropped", help="Write single ghosts in small data windows.", rich_help_panel=PANEL)
-    ] = False
+    cropped: Annotated[bool, output_option("--cropped", help="Write single ghosts in small data windows.")] = False
     radiance: Annotated[
         bool,
-        typer.Option(
+        output_option(
             "--radiance",
             help="Write radiances of the scene, which add to a rendered picture as they are (default: irradiances).",
-            rich_help_panel=PANEL,
         ),
     ] = False
-    processes: Annotated[
-        int | None, typer.Option(min=1, help="Number of processes (default: one per core).", rich_help_panel=WORK)
-    ] = None
+    processes: Annotated[int | None, work_option(min=1, help="Number of processes (default: one per core).")] = None
     chunk: Annotated[
-        str | None,
-        typer.Option(metavar="I/N", help="Draw part I of N of the frames, for render farms.", rich_help_panel=WORK),
+        str | None, work_option(metavar="I/N", help="Draw part I of N of the frames, for render farms.")
     ] = None
     cluster: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WHERE", help="Draw on a Dask cluster: local:N, tcp://HOST:PORT or slurm:FILE.",
-            rich_help_panel=WORK,
-        ),
-    ] = None  # fmt: skip
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print a summary as one JSON object.", rich_help_panel=WORK)
-    ] = False
+        str | None, work_option(metavar="WHERE", help="Draw on a Dask cluster: local:N, tcp://HOST:PORT or slurm:FILE.")
+    ] = None
+    as_json: Annotated[bool, work_option("--json", help="Print a summary as one JSON object.")] = False
 
 
 @dataclass(frozen=True, kw_only=True)
