@@ -121,8 +121,7 @@ def project_of_options(
     elif state is not None:
         base = state.project
     start = (timeline or {}).get("start", 1 if base is None else base.timeline.start)
-    tracked = given_tracks(options, start)
-    flags = replace(options, base=base, tracked=tracked)
+    flags = replace(options, base=base, tracked=given_tracks(options, start))
     given, plain = settings_of(flags), options.ideal or options.project is not None or state is not None
     remarks: list[str] = []
     if options.look is not None:
