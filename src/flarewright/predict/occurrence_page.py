@@ -111,9 +111,7 @@ def _context(found: Occurrence) -> dict[str, Any]:
     ratio = contrast_curve(found)
     if ratio is not None and setting.luminance_cd_m2 is not None:
         low, high = setting.luminance_cd_m2
-        drawn.append(
-            chart("remaining contrast, K_real / K_ideal", [Series("", at, ratio, COLOURS[1])], x_label=_ANGLE)
-        )  # fmt: skip
+        drawn.append(chart("remaining contrast, K_real / K_ideal", [Series("", at, ratio, COLOURS[1])], x_label=_ANGLE))
         worst = int(np.argmin(ratio))
         words += (
             f" In a scene of {number(low)} to {number(high)} cd/m² it leaves {ratio[worst]:.1%} of the contrast at "

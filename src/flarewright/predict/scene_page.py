@@ -108,9 +108,7 @@ def _over_time(plan: Plan) -> list[Chart]:
     ]  # fmt: skip
     if plan.scene.luminance_cd_m2 is not None:
         left = [Series(one.label, hours, plan.contrast_left(np.asarray(one.y)), one.colour) for one in veils]  # type: ignore[arg-type]
-        drawn.append(
-            chart("remaining contrast, K_real / K_ideal", left, x_label=label, size=(700, 300), x_ticks=ticks)
-        )  # fmt: skip
+        drawn.append(chart("remaining contrast, K_real / K_ideal", left, x_label=label, size=(700, 300), x_ticks=ticks))
     angles: list[Series] = []
     for c, camera in enumerate(cameras[:LINES]):
         for k, light in enumerate(plan.scene.lights):
@@ -119,9 +117,7 @@ def _over_time(plan: Plan) -> list[Chart]:
                 lit = np.where(seen.illuminance_lx > 0.0, seen.constellation_deg, np.nan)
                 name = f"{light.name} in {camera.name}"
                 angles.append(Series(name, hours, lit, COLOURS[len(angles) % len(COLOURS)]))
-    drawn.append(
-        chart("constellation, degrees off axis", angles, x_label=label, size=(700, 300), x_ticks=ticks)
-    )  # fmt: skip
+    drawn.append(chart("constellation, degrees off axis", angles, x_label=label, size=(700, 300), x_ticks=ticks))
     return drawn
 
 

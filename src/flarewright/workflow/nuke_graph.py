@@ -96,11 +96,9 @@ def flare_nodes(flare: Passes, source: str, gains: str = "", overall: str = "1")
     """
     # the values of the file become irradiances, and then those of the plate
     made = [
-        Node(
-            "Multiply", "Irradiance", (("channels", "all"), ("value", repr(1.0 / flare.scale))), (source,), (0, 1)
-        ),
+        Node("Multiply", "Irradiance", (("channels", "all"), ("value", repr(1.0 / flare.scale))), (source,), (0, 1)),
         Node("Multiply", "Exposure", (("channels", "all"), ("value", overall)), ("Irradiance",), (0, 2)),
-    ]  # fmt: skip
+    ]
     if not flare.passes:
         return [*made, _grade("beauty", "Exposure", gains, (0, 3))]
     branches: list[str] = []

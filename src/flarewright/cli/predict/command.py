@@ -40,9 +40,7 @@ EPILOG = (
 
 # options by what they are for
 _OF_LENS = ("fstop", "coating", "zoom", "focus", "spectrum", "light_diameter")
-_OF_CURVES = (
-    "sensor", "roll", "to", "bins", "illuminance", "luminance", "tolerance", "samples", "check",
-)  # fmt: skip
+_OF_CURVES = ("sensor", "roll", "to", "bins", "illuminance", "luminance", "tolerance", "samples", "check")
 _OF_MODEL = ("unit_per_cd_m2", "count", "around_light")
 _OF_SCENE = ("near", "radius", "height", "shortest_shot")
 

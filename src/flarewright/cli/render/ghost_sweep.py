@@ -158,7 +158,6 @@ def print_sweep(name: str, points: Sequence[SweepPoint], gains: Sequence[Surface
         ranked.add_column(column, justify="right", no_wrap=True)
     for gain in gains:
         ranked.add_row(
-            str(gain.row), f"{gain.part:.1%}", f"{gain.largest_part:.1%}", gain.brightest,
-            f"{gain.peak_irradiance:.3g}",
-        )  # fmt: skip
+            str(gain.row), f"{gain.part:.1%}", f"{gain.largest_part:.1%}", gain.brightest, f"{gain.peak_irradiance:.3g}"
+        )
     console().print(ranked)

@@ -71,9 +71,7 @@ class Objective:
     @property
     def for_kernels(self) -> GhostAims:
         """The target ghosts as the searches take them."""
-        return GhostAims(
-            self.slopes, self.spans, self.targets, self.weights, self.signed, self.extra * self.extra_part
-        )  # fmt: skip
+        return GhostAims(self.slopes, self.spans, self.targets, self.weights, self.signed, self.extra * self.extra_part)
 
     @property
     def wanted(self) -> int:

@@ -129,10 +129,7 @@ def broken_limits(problem: Problem) -> tuple[BrokenLimit, ...]:
              for each in enclosed]  # fmt: skip
     # tolerance for rounding
     off = {m: np.maximum(whole[m].low - high[m], low[m] - whole[m].high) > 1e-9 * (low[m] + high[m]) for m, _ in named}
-    single = [
-        BrokenLimit((name,), _nearest(m, whole[m], float(high[m])))
-        for m, name in named if off[m].all()
-    ]  # fmt: skip
+    single = [BrokenLimit((name,), _nearest(m, whole[m], float(high[m]))) for m, name in named if off[m].all()]
     if single:
         return tuple(single)
     together = len(named) > 1 and bool(np.any([off[m] for m, _ in named], axis=0).all())

@@ -20,9 +20,7 @@ STEEPEST = 0.9
 LEAST = 0.1
 
 
-def clear_radii(
-    structure: Structure, vector: Floats, slopes: Floats, entrance: float, *, edge: float = 0.1
-) -> Floats:  # fmt: skip
+def clear_radii(structure: Structure, vector: Floats, slopes: Floats, entrance: float, *, edge: float = 0.1) -> Floats:
     """Choose semi-diameters that pass the axial beam and, where surfaces stay apart, the ghosts.
 
     Parameters

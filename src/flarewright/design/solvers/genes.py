@@ -46,9 +46,8 @@ class Genes:
         """Compute the fitness of many points, shape (B, D): shape (B,)."""
         aim, out = self.problem.objective, np.empty(len(genes))
         kernel.fitness_of_genes(
-            np.ascontiguousarray(genes), self.code, _KINDS[self.measure], aim.entrance, aim.for_kernels, aim.limits,
-            out,
-        )  # fmt: skip
+            np.ascontiguousarray(genes), self.code, _KINDS[self.measure], aim.entrance, aim.for_kernels, aim.limits, out
+        )
         return out
 
     def candidates(self, genes: Floats, costs: Floats) -> tuple[LensCandidate, ...]:

@@ -179,9 +179,7 @@ def remove_row(project: Project, row: int) -> Project:
     last = rows[-1]
     if row == len(rows) and isinstance(last, Surface):
         rows[-1] = last.replace(medium=None)
-    return _renumbered(
-        project, lens, tuple(rows), lambda k: None if k == row else k - (k > row)
-    )  # fmt: skip
+    return _renumbered(project, lens, tuple(rows), lambda k: None if k == row else k - (k > row))
 
 
 def move_stop(project: Project, row: int) -> Project:

@@ -19,9 +19,7 @@ SPOKEN = {
     "field_deg": "angle of the light",
 }  # fmt: skip
 UNITS = ("mm", "um", "nm", "deg", "px", "s", "k", "stops")
-BOUNDS = {
-    "greater than or equal to": "at least", "less than or equal to": "at most", "greater than": "more than",
-}  # fmt: skip
+BOUNDS = {"greater than or equal to": "at least", "less than or equal to": "at most", "greater than": "more than"}
 _INDEX = re.compile(r"\[\d+\]")
 _REPORTED = re.compile(r"([\w.\[\]]+)( should be |: )(.*)", re.DOTALL)
 

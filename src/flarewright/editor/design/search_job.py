@@ -286,9 +286,8 @@ class Solver:
             self.session.tell({"type": "message", "kind": "warning", "text": f"The search is not kept: {error}"})
 
     def _found(
-        self, project: Project, problem: Problem, state: PoolState, count: int, name: str,
-        over: Over,
-    ) -> tuple[FoundLens, ...]:  # fmt: skip
+        self, project: Project, problem: Problem, state: PoolState, count: int, name: str, over: Over
+    ) -> tuple[FoundLens, ...]:
         best = outcomes(state, problem, count=count, name=f"After {name}", iris=project.iris, over=over)
         out = []
         # sort by the reported error, and put lenses with lost ghosts last

@@ -127,15 +127,11 @@ def ghost_places(project: Project) -> list[dict[str, object]]:
     """
     settled = resolve_project(project)
     structure_of(settled.lens)
-    found = placed_ghosts(
-        settled.lens, f_number=settled.order.f_number, sensor_distance=settled.order.sensor_distance
-    )  # fmt: skip
+    found = placed_ghosts(settled.lens, f_number=settled.order.f_number, sensor_distance=settled.order.sensor_distance)
     return [
-        {
-            "name": f"{one.first_reflection}-{one.second_reflection}", "per_slope": one.place, "radius": one.radius,
-        }
+        {"name": f"{one.first_reflection}-{one.second_reflection}", "per_slope": one.place, "radius": one.radius}
         for one in found
-    ]  # fmt: skip
+    ]
 
 
 def library() -> tuple[dict[str, object], ...]:

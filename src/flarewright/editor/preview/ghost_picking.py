@@ -90,9 +90,7 @@ def see(project: Project, grade: Grade, progress: Progress | None = None) -> Pic
     rendering = render_any(stage, progress=progress)
     width, height = stage.camera.size_px
     across = stage.camera.sensor[0] / width
-    ghosts = [
-        _seen(layer, (width, height), across) for layer in rendering.layers if layer.name.startswith("ghost.")
-    ]  # fmt: skip
+    ghosts = [_seen(layer, (width, height), across) for layer in rendering.layers if layer.name.startswith("ghost.")]
     lit = sorted((ghost for ghost in ghosts if ghost.flux > 0.0), key=lambda ghost: -ghost.flux)
     return PickableGhosts(project, (width, height), tuple(lit))
 

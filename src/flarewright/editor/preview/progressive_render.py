@@ -149,9 +149,8 @@ def _show_soon(screen: Screen, project: Project, view: View, check: Check) -> No
 
 
 def _show_final(
-    screen: Screen, project: Project, view: View, drafted: tuple[DrawnPicture | None, Levels], fresh: bool,
-    check: Check,
-) -> None:  # fmt: skip
+    screen: Screen, project: Project, view: View, drafted: tuple[DrawnPicture | None, Levels], fresh: bool, check: Check
+) -> None:
     """Show the final picture, and derive the gains of drafts from it."""
     draft, levels = drafted
     final = _final(screen, project, view, check)

@@ -170,9 +170,7 @@ class Imported:
     remarks: tuple[str, ...] = ()
 
 
-def imported(
-    name: str, data: bytes, folder: Path, allowed: Callable[[Project], None] = _any_project
-) -> Imported:  # fmt: skip
+def imported(name: str, data: bytes, folder: Path, allowed: Callable[[Project], None] = _any_project) -> Imported:
     """Import a file dropped on the page.
 
     Parameters

@@ -28,9 +28,7 @@ _TRANSFERS: dict[int, Transfer] = {
     1: "rec709", 4: "gamma22", 5: "gamma28", 6: "rec709", 8: "linear", 11: "rec709", 12: "rec709", 13: "srgb",
     14: "rec709", 15: "rec709", 16: "pq", 18: "hlg",
 }  # fmt: skip
-_PRIMARIES = {
-    1: "bt709", 2: "bt709", 5: "bt470bg", 6: "smpte170m", 7: "smpte170m", 9: "bt2020", 11: "p3", 12: "p3",
-}  # fmt: skip
+_PRIMARIES = {1: "bt709", 2: "bt709", 5: "bt470bg", 6: "smpte170m", 7: "smpte170m", 9: "bt2020", 11: "p3", 12: "p3"}
 _UNKNOWN, _FULL = 2, 2
 _LEAST_BITS = 8
 # films without a stated matrix: smaller ones are of the time of BT.601
@@ -223,9 +221,7 @@ def _check_length(path: str, frames: int, fps: Fraction | None, long_s: float) -
         )
 
 
-def _rate(
-    times: NDArray[np.int64], base: Any, stated: Any, frames: int
-) -> tuple[Fraction | None, tuple[str, ...]]:  # fmt: skip
+def _rate(times: NDArray[np.int64], base: Any, stated: Any, frames: int) -> tuple[Fraction | None, tuple[str, ...]]:
     """Return the frames per second, and a remark if they are not evenly spaced."""
     given = Fraction(stated) if stated and 0 < stated <= 1000 else None
     if len(times) < 2 or base is None:

@@ -50,9 +50,7 @@ ROUNDED = 1e-6
 MOST_LIFTED = 1.0
 
 
-def read_lens(
-    path: str | Path, first_column: codev.FirstColumn | None = None
-) -> LensReading | RawLens | RawSequence:  # fmt: skip
+def read_lens(path: str | Path, first_column: codev.FirstColumn | None = None) -> LensReading | RawLens | RawSequence:
     """Read a lens file of any known kind.
 
     Parameters

@@ -283,9 +283,7 @@ _SECTIONS: Sections = {
 
 
 # sections whose keys are common words; suggestions do not search them
-_DESIGN: Sections = {
-    "design": (designs.Design,), "ghost_targets": (designs.GhostTarget,), "bounds": (designs.Bounds,),
-}  # fmt: skip
+_DESIGN: Sections = {"design": (designs.Design,), "ghost_targets": (designs.GhostTarget,), "bounds": (designs.Bounds,)}
 
 
 def _suggestion(keys: Keys, sections: Sections | None) -> str:

@@ -225,9 +225,7 @@ def curves_of(
     times = frame_halvings(views[0].size_px[0], settings.tracking.frame)
     factor = 2.0**times
     shapes = [_sized(ghost, 1.0 / factor) for ghost in ghosts]
-    visible = [
-        [g for g, span in enumerate(spans) if span[0] <= view.constellation_deg <= span[1]] for view in views
-    ]  # fmt: skip
+    visible = [[g for g, span in enumerate(spans) if span[0] <= view.constellation_deg <= span[1]] for view in views]
 
     def one(view: View, there: list[int]) -> Measured:
         some, frame = [shapes[g] for g in there], settings.tracking.frame

@@ -79,9 +79,7 @@ def fit_ghosts(
         views = read_views(folder, run, every, pool)
         # keep the removed ghosts in the fit: without them the search would detect them again, and the other ghosts
         # would absorb their light
-        found = [
-            replace(_to_found(ghost, views), unwanted=k >= len(rough.ghosts)) for k, ghost in enumerate(ghosts)
-        ]  # fmt: skip
+        found = [replace(_to_found(ghost, views), unwanted=k >= len(rough.ghosts)) for k, ghost in enumerate(ghosts)]
         # a fixed order: sums in another order differ in their last digits, and the searches amplify that
         found = [found[k] for k in by_brightness(found)]
         dim = fit_and_subtract_glow(found, views, star_of(views, pool, settings.glow), pool, settings.glow)

@@ -287,9 +287,7 @@ def _on_threads(plan: MergePlan, numbers: Sequence[int], workers: int) -> Genera
             raise
 
 
-def merge_frame(
-    plan: MergePlan, number: int, writing: AbstractContextManager[object] = nullcontext()
-) -> FrameOutcome:  # fmt: skip
+def merge_frame(plan: MergePlan, number: int, writing: AbstractContextManager[object] = nullcontext()) -> FrameOutcome:
     """Merge one constellation, or return the frame of an earlier run if it is up to date.
 
     Parameters

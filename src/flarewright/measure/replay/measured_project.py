@@ -204,9 +204,7 @@ def render_measured(project: Project, *, progress: Progress | None = None, limit
     by_pass = {} if project.art.physical else project.art.gain
     with np.errstate(over="ignore", invalid="ignore"):
         passes = [with_gain(layer, by_pass.get(_PASSES[name], 1.0)) for name, layer in parts.items()]
-        others = [
-            with_gain(layer, by_pass.get("ghosts", 1.0)) for layer in _brightest(project, flare, singles, gains)
-        ]  # fmt: skip
+        others = [with_gain(layer, by_pass.get("ghosts", 1.0)) for layer in _brightest(project, flare, singles, gains)]
         passes, others = apply_gamut(project.output.gamut, passes), apply_gamut(project.output.gamut, others)
         total = beauty(passes, size)
     check_finite((total, *others))

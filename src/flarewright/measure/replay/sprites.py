@@ -90,9 +90,7 @@ def kept_part(sprites: Sequence[Sprite], roll_deg: float) -> float:
     return 1.0 - (1.0 - _REMAINS) * far * far * (3.0 - 2.0 * far)
 
 
-def ways(
-    sprite: Sprite, constellation_deg: float, roll_deg: float, off: float, kept: float = 1.0
-) -> tuple[Way, ...]:  # fmt: skip
+def ways(sprite: Sprite, constellation_deg: float, roll_deg: float, off: float, kept: float = 1.0) -> tuple[Way, ...]:
     """Return the drawings whose weighted sum is a sprite at a roll.
 
     Parameters

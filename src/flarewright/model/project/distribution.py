@@ -193,9 +193,7 @@ Distribution = Annotated[
 AnyDistribution = Constant | Choice | Uniform | LogUniform | Normal | Integers
 
 
-def within(
-    least: float, largest: float, *, whole: bool = False
-) -> Callable[[AnyDistribution], AnyDistribution]:  # fmt: skip
+def within(least: float, largest: float, *, whole: bool = False) -> Callable[[AnyDistribution], AnyDistribution]:
     """Return a validator that rejects a distribution with values outside a range.
 
     Parameters

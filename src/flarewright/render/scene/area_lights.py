@@ -129,9 +129,7 @@ def _centre(
     if draft:
         return draft_centre(elsewhere, path), float("inf")
     packed, seen, opening = elsewhere.packed, elsewhere.incidence, shot.opening
-    region = find_region(
-        packed, path, seen.tilt, opening.radius, one_color=True, beside=near[-1] if near else None
-    )  # fmt: skip
+    region = find_region(packed, path, seen.tilt, opening.radius, one_color=True, beside=near[-1] if near else None)
     if region is None:
         return None
     near.append(region)

@@ -99,9 +99,8 @@ def draw_stars(
 
 
 def _add_plain_wings(
-    total: Pixels, shared: kernel.StarSet, windows: Indices, pixel_mm: tuple[float, float],
-    threads: int | None,
-) -> None:  # fmt: skip
+    total: Pixels, shared: kernel.StarSet, windows: Indices, pixel_mm: tuple[float, float], threads: int | None
+) -> None:
     """Add the wings of a round or straight-bladed iris."""
     height, width = total.shape[:2]
     x = (np.arange(width) + 0.5) * pixel_mm[0]

@@ -134,9 +134,7 @@ def _refuse_layer(settings: PlateSettings) -> None:
 
 
 @lru_cache(maxsize=1)
-def _picture(
-    path: str, index: int | None, _: int | str, layer: str | None, transfer: Transfer | None
-) -> PlatePicture:  # fmt: skip
+def _picture(path: str, index: int | None, _: int | str, layer: str | None, transfer: Transfer | None) -> PlatePicture:
     if index is not None:
         picture = read_film_frame(path, index, transfer=transfer)
     else:

@@ -78,9 +78,7 @@ def _sequence(path: Path, data: Any, problems: list[str]) -> RawSequence | None:
     gaps = [_gap(entry, after - before) for entry, (before, after) in zip(surfaces[:-1], pairwise(z), strict=True)]
     rows = [_row(k, surfaces[k], gaps[k], problems, findings, remarks) for k in range(1, len(gaps))]
     if _medium(0, _part(surfaces[0], "material_post"), problems, findings) is not None:
-        problems.append(
-            "surface 0: the lens stands in a medium: Flarewright traces light that comes through air"
-        )  # fmt: skip
+        problems.append("surface 0: the lens stands in a medium: Flarewright traces light that comes through air")
     if problems:
         return None
     kept = tuple(row for row in rows if row is not None)

@@ -51,9 +51,7 @@ _IDLE = frozenset({
     "TSD", "WRSP", "AFO", "AIM", "IMS", "DLNR",
 })  # fmt: skip
 # what a file states once and a configuration again
-_COMMON = (
-    "stop_semi_diameter", "focus_distance", "f_number", "entrance_pupil_diameter", "field_deg", "image_height"
-)  # fmt: skip
+_COMMON = ("stop_semi_diameter", "focus_distance", "f_number", "entrance_pupil_diameter", "field_deg", "image_height")
 _PICKED = {"GLA": "glass", "CV": "curvature", "CVM": "curvature", "TH": "thickness", "THM": "thickness", "AP": "rim"}
 
 

@@ -129,9 +129,7 @@ def _sequence(path: Path, found: Text) -> RawSequence | None:
     )  # fmt: skip
 
 
-def _row(
-    block: Block, mm: float, found: Text, findings: list[tuple[int, media.Finding]]
-) -> SequenceRow | None:  # fmt: skip
+def _row(block: Block, mm: float, found: Text, findings: list[tuple[int, media.Finding]]) -> SequenceRow | None:
     """Return the surface of a block; appends errors to the problems."""
     problems, where = found.problems, f"surface {block.number}"
     before = len(problems)
@@ -279,9 +277,7 @@ def _asphere(
     return {"curvature": curvature, "conic": conic, "asphere": asphere}
 
 
-def _medium(
-    number: int, words: list[str], found: Text, findings: list[tuple[int, media.Finding]]
-) -> Medium | None:  # fmt: skip
+def _medium(number: int, words: list[str], found: Text, findings: list[tuple[int, media.Finding]]) -> Medium | None:
     """Return the medium of a glass by its name; by its numbers for a nameless, unknown or contradicted one."""
     name, nameless = words[0], words[0].startswith("___")
     n_d, v_d, refusal = _glass_numbers(number, words, found)
