@@ -78,6 +78,28 @@ def test_rays_on_the_cut_go_on_as_their_neighbours_run():
     assert areas(whole.pupil, whole.triangles[keeps]).sum() == pytest.approx(np.pi * 0.09, rel=0.01)
 
 
+def test_slopes_are_the_least_squares_of_a_cell():
+    """Against NumPy's solver, for rays that no plane fits and that fail here and there."""
+    random = np.random.default_rng(3)
+    bundle, data = fan(lambda x, y: random.random(len(x)) < 0.3)
+    data[:, X] = np.where(data[:, ALIVE] > 0.0, np.cos(9.0 * bundle.pupil[:, 0]) * bundle.pupil[:, 1], np.inf)
+    whole, more = cut_failed_triangles(bundle, data)
+    alive, checked = data[:, ALIVE] > 0.0, 0
+    for begin, cut, last in whole.triangles[len(bundle.triangles) :]:
+        cell = np.unique(bundle.triangles[bundle.triangles[:, 0] == begin])
+        passing = cell[alive[cell]]
+        # parts that begin at a cell's centre and have two cuts: the last one is on an edge from there
+        if len(passing) < 4 or cut < len(data):
+            continue
+        centred, values = bundle.pupil[passing] - bundle.pupil[passing].mean(axis=0), data[passing, X]
+        slopes, _, rank, _ = np.linalg.lstsq(centred, values - values.mean(), rcond=1e-6)
+        if rank == 2:
+            expected = data[begin, X] + (whole.pupil[last] - bundle.pupil[begin]) @ slopes
+            assert more[last, X] == pytest.approx(expected, abs=1e-9)
+            checked += 1
+    assert checked > 200
+
+
 @pytest.mark.parametrize("ends", [lambda x, y: x > 2.0, lambda x, y: x > -1.0])
 def test_what_is_whole_or_dark_is_left_alone(ends):
     bundle, data = fan(ends)

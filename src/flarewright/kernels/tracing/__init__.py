@@ -15,7 +15,7 @@ Python calls `trace_nodes`, `trace_squares` and `trace_hits` (`sequential`), `fi
 - `grid_limits`: `GridLimits`, how far the adaptive grid is refined
 - `adaptive_grid`: `build_mesh`, a traced and triangulated quadtree over that part
 - `ray_interpolation`: `rays_between`, `visible_areas`, rays at other wavelengths
-- `torn_triangles`: `find_torn`, triangles in which some rays fail
+- `torn_triangles`: `cut_torn`, the parts that pass of triangles in which some rays fail
 - `representative_rays`: `seen_rays`, `choose_representatives`, `shift_quantile`
 - `iris_edge`: where light reaches the iris edge: `reached_edges`, `bounded_by_iris`, `widen_box`, `widen_stops`,
   `largest_part`
