@@ -221,10 +221,12 @@ def _draw_triangle(bundle, t, texture, target, room):
     top, bottom = min(spots[a, 1], spots[b, 1], spots[c, 1]), max(spots[a, 1], spots[b, 1], spots[c, 1])
     if right <= 0.0 or left >= width or bottom <= 0.0 or top >= height:
         return
-    _place_in_stop(data, triangles, t, bundle.mirror, target.axes, stops)
-    # an int literal has another type and would compile the callees a second time
-    if _is_dark_anywhere(table, corners, stops, np.int64(3)):
-        return
+    open_ = bundle.deep[a] and bundle.deep[b] and bundle.deep[c]
+    if not open_:
+        _place_in_stop(data, triangles, t, bundle.mirror, target.axes, stops)
+        # an int literal has another type and would compile the callees a second time
+        if _is_dark_anywhere(table, corners, stops, np.int64(3)):
+            return
     flux, area = _triangle_flux(data, pupil, a, b, c)
     flux *= target.gain
     whole = blocked[a] | blocked[b] | blocked[c] == 0
@@ -232,7 +234,7 @@ def _draw_triangle(bundle, t, texture, target, room):
     drawn = abs(area) * pixel_area
     inside = left >= 0.0 and top >= 0.0 and int(left) == int(right) and int(top) == int(bottom)
     if (whole and inside) or drawn < SLIVER:
-        for k in range(table.shape[0]):
+        for k in range(0 if open_ else table.shape[0]):
             x = (stops[k, 0, 0] + stops[k, 1, 0] + stops[k, 2, 0]) / 3.0
             y = (stops[k, 0, 1] + stops[k, 1, 1] + stops[k, 2, 1]) / 3.0
             flux *= pattern_value(values, table, corners, k, x, y)
@@ -250,7 +252,11 @@ def _draw_triangle(bundle, t, texture, target, room):
     for m in range(3):
         k = triangles[t, m]
         corner[m, 0], corner[m, 1], corner[m, 2] = spots[k, 0], spots[k, 1], bundle.densities[k]
-    _places_over_triangle(corner, stops, table, corners, places)
+    if open_:
+        for k in range(table.shape[0]):
+            places[k, WAY] = OPEN
+    else:
+        _places_over_triangle(corner, stops, table, corners, places)
     base, gx, gy, low, high = _plane_through(corner, flux / drawn, target.gain / pixel_area, drawn)
     if left < 0.0 or right > width or top < 0.0 or bottom > height:
         count = cut_to_rectangle(polygon, count, room.other, room.values, float(width), float(height))
