@@ -79,17 +79,15 @@ def steepness(
     """
     if shot.between is None:
         return "not"
-    traced_nm = shot.packed.wavelengths_nm
-    known_nm = np.union1d(shot.between.fine_nm[[0, -1]], traced_nm)
-    drawn = np.isin(known_nm, traced_nm)
-    fitted = np.flatnonzero(drawn)[sorted(bundle.traced)]
-    few = np.unique([0, *fitted, len(known_nm) - 1])
+    fine_nm, traced_nm = shot.between.fine_nm, shot.packed.wavelengths_nm
+    known_nm, drawn, few, others = _known_wavelengths(
+        (fine_nm[0], fine_nm[-1]), tuple(traced_nm), tuple(sorted(bundle.traced))
+    )
     throughput = np.empty(len(known_nm))
     throughput[few] = first = areas_between(shot, bundle, known_nm[few], to_pixels)
     # without a traced wavelength that shows the ghost, extrapolation is too rough to draw it at 21
     if not first[drawn[few]].any() or first.max() - first.min() <= LEAST_CHANGE * first.max():
         return "not"
-    others = np.setdiff1d(np.arange(len(known_nm)), few)
     throughput[others] = areas_between(shot, bundle, known_nm[others], to_pixels)
     passed = np.ones(len(CURVE_NM)) if spectrum is None else spectrum.passed
     error, total = interpolation_error(passed, seen_light(shot), known_nm, throughput, drawn)
@@ -97,6 +95,17 @@ def steepness(
         return "not"
     throughput = throughput[drawn]
     return "much" if throughput.min() < SLIVER_PART * throughput.max() else "little"
+
+
+@lru_cache(maxsize=64)
+def _known_wavelengths(
+    ends_nm: tuple[float, float], traced_nm: tuple[float, ...], waves: tuple[int, ...]
+) -> tuple[Floats, Mask, NDArray[np.intp], NDArray[np.intp]]:
+    """Return traced wavelengths and ends of the spectrum, ascending; the traced ones; ends and `waves`; all others."""
+    known_nm = np.union1d(ends_nm, traced_nm)
+    drawn = np.isin(known_nm, traced_nm)
+    few = np.unique([0, *np.flatnonzero(drawn)[list(waves)], len(known_nm) - 1])
+    return known_nm, drawn, few, np.setdiff1d(np.arange(len(known_nm)), few)
 
 
 def _begins_in_a_gap(shot: Shot, passed: Floats, known_nm: Floats, throughput: Floats) -> bool:
