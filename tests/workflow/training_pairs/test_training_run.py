@@ -16,7 +16,7 @@ from flarewright import dataset, read_project, render
 from flarewright.errors import FlarewrightError, OutputError, ProjectError
 from flarewright.io.images.exr import read_exr
 from flarewright.model.project.dataset import DatasetSpec
-from flarewright.workflow.training_pairs import item
+from flarewright.workflow.training_pairs import item, run
 from flarewright.workflow.training_pairs.background import background_of, list_backgrounds, mean_luminance
 from flarewright.workflow.training_pairs.pictures import draw_pictures
 
@@ -130,6 +130,20 @@ def test_an_interrupted_run_resumes_and_finished_items_are_kept(whole, tmp_path,
     monkeypatch.setattr(item, "draw_pictures", None)
     assert dataset(spec_of(), folder, items=ITEMS, processes=1).kept == ITEMS
     assert not (folder / ".items").exists()
+
+
+def test_items_are_written_while_another_process_packs_the_last_ones_before(tmp_path, monkeypatch):
+    """The folder of unfinished items must not vanish between its making and the file in it."""
+    plan, make_folder = run.plan_of(spec_of(), tmp_path / "pairs"), item.make_folder
+    plan.staging.mkdir(parents=True)
+
+    def made_and_emptied(folder):
+        make_folder(folder)
+        run._remove_fragments(plan, range(3))
+
+    monkeypatch.setattr(item, "make_folder", made_and_emptied)
+    assert item.write_item(plan, 3).drawn
+    assert [path.name for path in plan.staging.iterdir()] == ["00000003.part"]
 
 
 def test_a_set_grows_but_never_mixes(whole, tmp_path):

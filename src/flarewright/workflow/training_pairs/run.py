@@ -177,6 +177,10 @@ def dataset(
     remarks = []
     if (many := _write_manifest(plan, items)) > 0:
         remarks.append(f"{many} of {items} items are not drawn yet; the manifest is written when all are")
+    else:
+        # nobody writes a part of a complete data set; the folder is not empty while another machine packs one
+        with suppress(OSError):
+            plan.staging.rmdir()
     return _result(plan, items, done, number if todo else 0, remarks, complete=many == 0)
 
 
@@ -321,13 +325,9 @@ def _pack(plan: DatasetPlan, unit: range) -> None:
 
 
 def _remove_fragments(plan: DatasetPlan, unit: range) -> None:
-    """Remove the items of a complete tar file, and their folder with the last ones."""
-    if not plan.staging.is_dir():
-        return
+    """Remove the items of a complete tar file; their folder stays, because other processes write into it."""
     for index in unit:
         fragment(plan, index).unlink(missing_ok=True)
-    with suppress(OSError):
-        plan.staging.rmdir()
 
 
 def _records(path: Path) -> Iterator[tuple[bytes, dict[str, Any]]]:
