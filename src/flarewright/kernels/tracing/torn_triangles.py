@@ -36,7 +36,7 @@ def cut_torn(data, pupil, triangles):
     rays, places = np.empty((2 * count, columns)), np.empty((2 * count, 2))
     parts = np.empty((2 * count, 3), dtype=np.int64)
     slopes = np.empty((2, columns))
-    # what is left of a triangle that loses one corner takes a second part, behind all first ones
+    # a triangle that loses one corner keeps two parts; the second ones follow all first ones
     more, cell = count, np.int64(-1)
     for k in range(count):
         t = torn[k]
@@ -71,7 +71,7 @@ def _find_torn(data, triangles):
     for t in range(torn.size):
         passing = 0
         for m in range(3):
-            passing += data[triangles[t, m], ALIVE] > 0.0
+            passing += _passes(data, triangles[t, m])
         if 0 < passing < 3:
             torn[count] = t
             count += 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan, atan2, ceil, cos, hypot, radians, sin, sqrt, tan
+from math import atan, atan2, cos, hypot, radians, sin, sqrt, tan
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ...kernels.tracing.sequential import ALIVE, REL, STOP_X, X, Y, trace_nodes
 from ...typing import Floats, Indices, Mask
 from ..lens.paths import LightPath
 from .pack import PackedLens, wavelengths_fitted
-from .pupil_region import Region, cells_across, front_box, tracing_arguments, widened_box
+from .pupil_region import Region, cells_across, cells_as_dense, front_box, tracing_arguments, widened_box
 
 # coarsest cells of a bundle's grid over half its region, and limit of halvings per cell; a whole region has twice as
 # many cells across
@@ -235,9 +235,7 @@ def trace_grid(
         if not sides.any():
             break
         wide = np.where(sides, widened_box(box, front, WIDER), box)
-        # the cells keep about their size
-        parts = (wide[1::2] - wide[0::2]) / (box[1::2] - box[0::2])
-        box, cells = wide, (ceil(cells[0] * parts[0]), ceil(cells[1] * parts[1]))
+        box, cells = wide, cells_as_dense(cells, box, wide)
     return Bundle(path, pupil, triangles, dict(zip(fitted, data, strict=True)), packed.halves, halved)
 
 

@@ -259,9 +259,8 @@ def find_region(
             halved += 1
         elif open_sides.any():
             wide = np.where(open_sides, widened_box(found, first, 1.0), found)
-            # as dense as before: wider cells would lose the light at the sides again
-            parts = (wide[1::2] - wide[0::2]) / (box[1::2] - box[0::2])
-            box, cells = wide, (max(ceil(cells[0] * parts[0]), cells[0]), max(ceil(cells[1] * parts[1]), cells[1]))
+            # wider cells would lose the light at the sides again
+            box, cells = wide, cells_as_dense(cells, box, wide)
         elif shrunk:
             box, cells = found, cells_across(packed, FINER)
         else:
@@ -388,6 +387,12 @@ def widened_box(box: Floats, front: Floats, part: float) -> Floats:
     wide, high = part * (box[1::2] - box[0::2])
     grown = box + np.array([-wide, wide, -high, high])
     return np.asarray(np.clip(grown, front[[0, 0, 2, 2]], front[[1, 1, 3, 3]]))
+
+
+def cells_as_dense(cells: tuple[int, int], box: Floats, other: Floats) -> tuple[int, int]:
+    """Return numbers of cells that cover another box as densely as `cells` cover a box, and no fewer."""
+    parts = (other[1::2] - other[0::2]) / (box[1::2] - box[0::2])
+    return max(ceil(cells[0] * parts[0]), cells[0]), max(ceil(cells[1] * parts[1]), cells[1])
 
 
 def _around(found: Floats, box: Floats, cells: tuple[int, int]) -> Floats:

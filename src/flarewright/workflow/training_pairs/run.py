@@ -178,7 +178,7 @@ def dataset(
     if (many := _write_manifest(plan, items)) > 0:
         remarks.append(f"{many} of {items} items are not drawn yet; the manifest is written when all are")
     else:
-        # nobody writes a part of a complete data set; the folder is not empty while another machine packs one
+        # no process writes an item of a complete data set; the folder is not empty while another machine packs one
         with suppress(OSError):
             plan.staging.rmdir()
     return _result(plan, items, done, number if todo else 0, remarks, complete=many == 0)
