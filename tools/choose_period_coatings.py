@@ -25,7 +25,8 @@ from flarewright.io.lens.coating_text import parse_coating
 from flarewright.io.lens.library import library_names
 from flarewright.model import Lens, Stop
 from flarewright.optics.coatings.response import coating_response
-from flarewright.optics.lens.paraxial import D_LINE_NM, gap_indices
+from flarewright.optics.lens.dispersion import D_LINE_NM
+from flarewright.optics.lens.paraxial import gap_indices
 from flarewright.render.scene.resolve import load_lens
 
 Floats = NDArray[np.float64]

@@ -20,7 +20,8 @@ from scipy.optimize import brentq, least_squares
 
 from flarewright.io.lens.media import attach
 from flarewright.model import Lens, Surface
-from flarewright.optics.lens.paraxial import D_LINE_NM, FirstOrder, first_order, path_matrices
+from flarewright.optics.lens.dispersion import D_LINE_NM
+from flarewright.optics.lens.paraxial import FirstOrder, first_order, path_matrices
 from flarewright.optics.lens.paths import ghost_path
 from flarewright.optics.lens.surface_shape import transposed
 from flarewright.optics.rays.single_rays import trace_polylines

@@ -550,8 +550,8 @@ def test_lens_show_draws(capsys, folder, more):
 
 
 def test_every_shipped_lens_can_be_drawn(capsys):
+    from flarewright.optics.lens.paraxial import first_order
     from flarewright.render.plots.cross_section import cross_section
-    from flarewright.render.scene.resolve import first_order
 
     for name in library_names():
         lens = fw.load_lens(name)

@@ -23,7 +23,8 @@ from flarewright.errors import FlarewrightError
 from flarewright.io.lens.library import lens_path
 from flarewright.io.project.project_file import read_project
 from flarewright.model import BlackBody, Light, PerRow, Preset, QuarterWave, Stop, Surface
-from flarewright.render.scene.resolve import first_order, open_lens, resolve_project
+from flarewright.optics.lens.paraxial import first_order
+from flarewright.render.scene.resolve import open_lens, resolve_project
 
 
 def do(project, command, /, **values):

@@ -24,7 +24,8 @@ import oracle
 from flarewright.errors import FlarewrightError
 from flarewright.kernels.tracing.sequential import ALIVE, REL, STOP_X, WEIGHT, X, Y
 from flarewright.model import Bare, Coating, CoatingChoice, Everywhere, Iris, Lens, QuarterWave
-from flarewright.optics.lens.paraxial import D_LINE_NM, first_order
+from flarewright.optics.lens.dispersion import D_LINE_NM
+from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.paths import LightPath, ghost_paths
 from flarewright.optics.pupil.iris import blade_edges
 from flarewright.optics.rays import ghost_table

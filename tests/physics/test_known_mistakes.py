@@ -35,7 +35,8 @@ from flarewright.model import (
 )
 from flarewright.optics.coatings.thin_film import film_stack, stack_reflectance
 from flarewright.optics.colour.spectrum import band_weights
-from flarewright.optics.lens.paraxial import D_LINE_NM, first_order
+from flarewright.optics.lens.dispersion import D_LINE_NM
+from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.paths import direct_path, ghost_path, ghost_paths
 from flarewright.optics.lens_import.patent_repair import repair
 from flarewright.optics.pupil.mask_levels import mask_levels

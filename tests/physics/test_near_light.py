@@ -11,7 +11,8 @@ from prescriptions import HELIAR, lens, system
 from flarewright.errors import ProjectError
 from flarewright.model import Camera, Iris, Light, Lines, Output, Project, Quality
 from flarewright.optics.colour.rgb import luminance_weights
-from flarewright.optics.lens.paraxial import D_LINE_NM, first_order, path_matrices
+from flarewright.optics.lens.dispersion import D_LINE_NM
+from flarewright.optics.lens.paraxial import first_order, path_matrices
 from flarewright.optics.lens.paths import direct_path, ghost_path
 from flarewright.optics.rays.bundle import incidence, trace_points
 from flarewright.optics.rays.pack import facing, pack_lens

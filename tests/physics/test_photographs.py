@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from flarewright.model import Bare, Camera, Everywhere, Film, Iris, Light, Lines, Output, Project, Quality, Stop
-from flarewright.optics.lens.paraxial import D_LINE_NM, gap_indices, path_matrices
+from flarewright.optics.lens.dispersion import D_LINE_NM
+from flarewright.optics.lens.paraxial import first_order, gap_indices, path_matrices
 from flarewright.optics.lens.paths import ghost_path, ghost_paths
 from flarewright.optics.rays.single_rays import trace_polylines
 from flarewright.render.analysis import ghosts
 from flarewright.render.render import render
-from flarewright.render.scene.resolve import first_order, load_lens
+from flarewright.render.scene.resolve import load_lens
 
 # --- spikes
 

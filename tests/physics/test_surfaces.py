@@ -12,7 +12,8 @@ from sensor_rays import trace_rays
 from flarewright.kernels.jit.decorators import for_python
 from flarewright.kernels.tracing import general_ray
 from flarewright.model import Dispersion, Element, Figure, Lens, Medium, Stop, Surface
-from flarewright.optics.lens.paraxial import D_LINE_NM, first_order
+from flarewright.optics.lens.dispersion import D_LINE_NM
+from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.paths import direct_path, ghost_path
 from flarewright.optics.rays.pack import pack_lens
 

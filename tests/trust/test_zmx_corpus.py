@@ -11,7 +11,8 @@ from sensor_rays import trace_rays
 from flarewright.errors import LensError
 from flarewright.io.lens.glass_catalogue import by_name
 from flarewright.model import Surface
-from flarewright.optics.lens.paraxial import D_LINE_NM, first_order
+from flarewright.optics.lens.dispersion import D_LINE_NM
+from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.paths import direct_path
 from flarewright.optics.lens.zoom import at_position
 from flarewright.optics.rays.pack import pack_lens

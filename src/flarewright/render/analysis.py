@@ -8,11 +8,12 @@ from pathlib import Path
 from ..errors import ProjectError
 from ..io.lens.coating_text import coating_choice
 from ..model import Coating, CoatingChoice, Imperfection, Lens, Plate
-from ..optics.lens.paraxial import D_LINE_NM, FirstOrder
+from ..optics.lens.dispersion import D_LINE_NM
+from ..optics.lens.paraxial import FirstOrder, first_order
 from ..optics.rays.bundle import least_distance
 from ..optics.rays.ghost_table import GhostQuery, GhostTable, ghost_table, pack_for_query
 from ..optics.rays.pack import SensorMirror
-from .scene.resolve import build, first_order, open_lens
+from .scene.resolve import build, check_opens, open_lens
 
 
 def paraxial(
@@ -43,6 +44,7 @@ def paraxial(
         The lens is unknown, forms no image, or does not reach the f-number.
     """
     known = open_lens(lens).lens
+    check_opens(known, f_number)
     return first_order(known, f_number, sensor_distance=sensor_distance, focus_distance=focus_distance)
 
 
@@ -112,7 +114,7 @@ def ghosts(
     )  # fmt: skip
     if not 0.0 <= sensor_reflectance <= 1.0:
         raise ProjectError(f"a sensor reflects between 0 and 1 of the light, not {sensor_reflectance:g}")
-    # raises for an f-number that the lens does not reach
+    check_opens(built.lens, f_number)
     order = first_order(
         built.lens, f_number, sensor_distance=built.sensor_distance, focus_distance=built.focus_distance
     )

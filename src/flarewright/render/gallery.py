@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from ..io.lens.library import library_names
 from ..io.project.look_file import read_look, shipped_looks
 from ..model import Camera, Light, Project
+from ..optics.lens.paraxial import first_order
 from .image.display import layers_exposure, view
 from .render import render
 from .scene.looks import demonstration
 from .scene.photographic_defaults import as_photographed
-from .scene.resolve import first_order, open_lens
+from .scene.resolve import open_lens
 
 PLACE_MM = (-7.92, 4.37)
 """Position of the light's direct image in the picture of a lens: up and left, so that ghosts cross the centre."""

@@ -11,8 +11,8 @@ from ..io.lens.formats.table_writer import csv_text, dotlens_text
 from ..io.lens.lens_writer import write_lens
 from ..io.lens.zemax.writer import LensState, zmx_text
 from ..model import Iris, Lens, Surface
+from ..optics.lens.paraxial import first_order
 from ..optics.lens.zoom import at_position
-from ..render.scene.resolve import first_order
 
 
 def export_lens(lens: Lens, path: Path) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import FlarewrightError, ProjectError, naming
 from ..io.files.sentences import summary
-from ..optics.lens.paraxial import D_LINE_NM
+from ..optics.lens.dispersion import D_LINE_NM
 from ..predict.plan import Plan, Ranked, plan_scene, ranking
 from ..predict.scene_data import scene_data
 from ..predict.scene_page import scene_page

@@ -14,7 +14,8 @@ from flarewright.kernels.design import vignetting
 from flarewright.kernels.design.cost import irradiance_of_ghosts
 from flarewright.kernels.jit.decorators import for_python
 from flarewright.model import Lines
-from flarewright.optics.lens.paraxial import D_LINE_NM, first_order, path_matrices, vertex_positions
+from flarewright.optics.lens.dispersion import D_LINE_NM
+from flarewright.optics.lens.paraxial import first_order, path_matrices, vertex_positions
 from flarewright.optics.lens.paths import ghost_path, ghost_paths
 from flarewright.render.scene.resolve import load_lens
 

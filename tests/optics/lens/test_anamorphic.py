@@ -10,7 +10,8 @@ from flarewright.kernels.raster.bundle import draw_bundle, measure_bundle, node_
 from flarewright.kernels.raster.polygons import blank_plane, to_pixels
 from flarewright.model import Art, Camera, Everywhere, Iris, Light, Output, Preset, Project, Quality, Rule
 from flarewright.model.lens.coating import Bare
-from flarewright.optics.lens.paraxial import D_LINE_NM, first_order
+from flarewright.optics.lens.dispersion import D_LINE_NM
+from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.paths import direct_path, ghost_path
 from flarewright.optics.rays.bundle import Refinement, trace_grid
 from flarewright.optics.rays.pack import pack_lens

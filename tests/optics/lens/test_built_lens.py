@@ -10,10 +10,11 @@ from prescriptions import HELIAR, ghost_table_of, lens
 
 from flarewright.errors import ProjectError
 from flarewright.model import Bare, Everywhere, Imperfection, Plate, Position, Surface
+from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.optics.lens.tolerances import glass_groups
 from flarewright.render.analysis import ghosts
-from flarewright.render.scene.resolve import build, first_order, load_lens
+from flarewright.render.scene.resolve import build, load_lens
 
 FIELD = (3.0, 2.0)
 GLASS = Plate(thickness=2.0, gap=0.5, n_d=1.5, v_d=60.0)

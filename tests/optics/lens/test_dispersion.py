@@ -9,7 +9,7 @@ from flarewright.errors import GlassError
 from flarewright.io.lens.glass_catalogue import by_name, cauchy_from_abbe
 from flarewright.model import Dispersion, Medium
 from flarewright.optics.lens.dispersion import (
-    LINE_D_NM,
+    D_LINE_NM,
     dispersion_index,
     refractive_index,
 )
@@ -39,7 +39,7 @@ def test_formulas_give_the_published_indices(name, n_d, v_d, n_f, n_c):
 
 def test_the_prescriptions_own_index_holds_at_the_d_line():
     medium = Medium(glass="N-BK7", n_d=1.5170, v_d=64.0, dispersion=by_name("N-BK7").dispersion)
-    n = refractive_index(medium, np.array([LINE_D_NM, LINE_F_NM]))
+    n = refractive_index(medium, np.array([D_LINE_NM, LINE_F_NM]))
     assert n[0] == 1.5170
     assert n[1] - n[0] == pytest.approx(1.52238 - 1.51680, abs=1e-5)
 

@@ -9,7 +9,8 @@ from sensor_rays import trace_rays
 
 from flarewright.errors import LensError
 from flarewright.model import Dispersion, Lens, Medium, Stop, Surface
-from flarewright.optics.lens.paraxial import D_LINE_NM, first_order, gap_indices, path_matrices, vertex_positions
+from flarewright.optics.lens.dispersion import D_LINE_NM
+from flarewright.optics.lens.paraxial import first_order, gap_indices, path_matrices, vertex_positions
 from flarewright.optics.lens.paths import direct_path, ghost_path, ghost_paths
 from flarewright.optics.rays.pack import pack_lens
 from flarewright.render.scene.resolve import load_lens

@@ -11,7 +11,8 @@ from sensor_rays import trace_rays
 
 from flarewright.io.lens.library import library_names
 from flarewright.model import Dispersion, Lens, Medium, Stop, Surface
-from flarewright.optics.lens.paraxial import D_LINE_NM, first_order
+from flarewright.optics.lens.dispersion import D_LINE_NM
+from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.paths import direct_path
 from flarewright.optics.lens_import.semi_diameters import half_field, with_semi_diameters
 from flarewright.optics.rays.pack import pack_lens

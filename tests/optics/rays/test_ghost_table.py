@@ -9,7 +9,8 @@ from sensor_rays import trace_rays
 
 from flarewright.errors import FlarewrightError
 from flarewright.model import Bare, Everywhere, QuarterWave
-from flarewright.optics.lens.paraxial import D_LINE_NM, first_order, path_matrices, vertex_positions
+from flarewright.optics.lens.dispersion import D_LINE_NM
+from flarewright.optics.lens.paraxial import first_order, path_matrices, vertex_positions
 from flarewright.optics.lens.paths import ghost_path, ghost_paths
 from flarewright.optics.rays.ghost_table import bounding_edges
 from flarewright.optics.rays.pack import pack_lens

@@ -15,6 +15,7 @@ from flarewright.kernels.scattering.single_scatter import (
     scattered_total,
 )
 from flarewright.model import RowScatter, Scatter
+from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.rays.pack import pack_lens
 from flarewright.optics.scattering.brdf import (
     NODES,
@@ -24,7 +25,7 @@ from flarewright.optics.scattering.brdf import (
 )
 from flarewright.optics.scattering.dust import LEAST_UM, dust_density, particles_above
 from flarewright.optics.scattering.mie import mie
-from flarewright.render.scene.resolve import first_order, load_lens
+from flarewright.render.scene.resolve import load_lens
 
 
 @numba.njit

@@ -24,6 +24,7 @@ from flarewright.model import (
     Stop,
     Surface,
 )
+from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.paths import direct_path, ghost_paths
 from flarewright.optics.rays.pack import pack_lens
 from flarewright.optics.scattering import veiling_glare as surround
@@ -33,7 +34,7 @@ from flarewright.render.render import render
 from flarewright.render.scattering import veiling_glare as glare_module
 from flarewright.render.scattering.veiling_glare import veiling_glare
 from flarewright.render.scene.opening import make_opening
-from flarewright.render.scene.resolve import complete_lens, first_order, load_lens, resolve_project
+from flarewright.render.scene.resolve import complete_lens, load_lens, resolve_project
 from flarewright.render.scene.shots import make_shots
 
 NM = 587.56

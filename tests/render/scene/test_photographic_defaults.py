@@ -6,10 +6,11 @@ from scipy import ndimage
 
 from flarewright.io.lens.library import library_names
 from flarewright.model import Art, Bare, Camera, Light, Preset, Project, Rule
+from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.rays.pack import resolve_coatings
 from flarewright.render.render import render
 from flarewright.render.scene.photographic_defaults import LIGHT_DEG, as_photographed, plausible_preset, stopped_down
-from flarewright.render.scene.resolve import first_order, load_lens
+from flarewright.render.scene.resolve import load_lens
 
 
 @pytest.mark.parametrize(

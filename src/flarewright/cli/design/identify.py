@@ -39,10 +39,12 @@ def identify(
     from ...design.problem.prescription import structure_of, vector_of
     from ...design.results.identify import Identification
     from ...design.results.identify import identify as analyse
-    from ...render.scene.resolve import first_order, open_lens
+    from ...optics.lens.paraxial import first_order
+    from ...render.scene.resolve import check_opens, open_lens
 
     opened = open_lens(lens)
     known = opened.lens
+    check_opens(known, f_number)
     order = first_order(known, f_number)
     structure = structure_of(known)
     vector = vector_of(known, 2.0 * order.stop_semi_diameter, order.sensor_distance)

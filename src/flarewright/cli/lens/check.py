@@ -23,7 +23,8 @@ def check(
     """Check lens files and list repairs; exit code 2 if any is rejected."""
     from ...io.files.door import sentences_for
     from ...io.images.mask_image import read_mask
-    from ...render.scene.resolve import first_order, open_lens
+    from ...optics.lens.paraxial import first_order
+    from ...render.scene.resolve import open_lens
 
     reading, column = aperture_reading(apertures), first_column_reading(first_column)
     results: list[dict[str, Any]] = []

@@ -15,8 +15,8 @@ def lenses(as_json: Json = False) -> None:
     from ...io.lens.library import lens_path, library_names
     from ...io.lens.own.record import as_json as record_json
     from ...io.lens.toml_lens import read_lens_toml
+    from ...optics.lens.paraxial import first_order
     from ...optics.rays.pack import preset_names
-    from ...render.scene.resolve import first_order
     from ...workflow.own_library.own_lenses import own_library
 
     found: list[dict[str, Any]] = []

@@ -50,10 +50,12 @@ def show(
         flag = "--light" if light is not None else "--ghost"
         raise ProjectError(f"{flag} chooses rays of a drawing: add --plot OUT.svg")
 
-    from ...render.scene.resolve import build, first_order, open_lens
+    from ...optics.lens.paraxial import first_order
+    from ...render.scene.resolve import build, check_opens, open_lens
 
     opened = open_lens(lens)
     prescription, remarks = build(opened.lens, zoom=zoom).lens, list(opened.remarks)
+    check_opens(prescription, f_number)
     order = first_order(prescription, f_number)
     if wavelength is not None:
         order = _order_at(prescription, f_number, wavelength)

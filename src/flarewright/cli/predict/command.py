@@ -241,7 +241,7 @@ def _project(options: PredictOptions, sensor: tuple[float, float]) -> Project:
 
 
 def _glare(project: Project, threads: int | None) -> VeilingGlare:
-    from ...optics.lens.paraxial import D_LINE_NM
+    from ...optics.lens.dispersion import D_LINE_NM
     from ...render.scattering.veiling_glare import veiling_glare
 
     return veiling_glare(project, D_LINE_NM, threads=threads)

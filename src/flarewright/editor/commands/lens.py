@@ -17,11 +17,11 @@ from ...io.lens.media import attach
 from ...measure.replay.measured_project import efl_mm, flare_of, is_measured
 from ...model import AsLens, CoatingChoice, Iris, Lens, PerRow, Position, Preset, Project, Row, Stop, Surface
 from ...model.project.art import Art
-from ...optics.lens.paraxial import FirstOrder
+from ...optics.lens.paraxial import FirstOrder, first_order
 from ...optics.lens.surface_shape import sag
 from ...optics.rays.image_height import image_heights
 from ...render.scene.photographic_defaults import as_photographed, plausible_preset
-from ...render.scene.resolve import first_order, open_lens
+from ...render.scene.resolve import open_lens
 from ...typing import Floats
 from ..common.messages import sentence, spoken
 

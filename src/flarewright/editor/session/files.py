@@ -26,10 +26,11 @@ from ...io.project.look_file import look_text, read_look
 from ...io.project.project_file import project_from_data, project_text, read_project
 from ...measure.replay.measured_project import is_measured, render_any, with_sensor
 from ...model import Camera, Iris, Lens, Light, Look, Project
+from ...optics.lens.paraxial import first_order
 from ...render.image.ocio_space import check_file_space, in_file_space
 from ...render.scene.looks import look_of
 from ...render.scene.photographic_defaults import as_photographed
-from ...render.scene.resolve import first_order, open_lens
+from ...render.scene.resolve import open_lens
 from ...typing import Progress
 from ..commands.lens import first_coating, own_lens
 from .image_files import pictures

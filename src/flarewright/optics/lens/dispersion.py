@@ -10,7 +10,7 @@ from flarewright.model import Dispersion, Medium
 from ...colorimetry import VISIBLE_NM
 from ...typing import Floats
 
-LINE_D_NM = 587.56
+D_LINE_NM = 587.56
 
 # limits of extrapolation: a little beyond the maker's range, and visible light in any case
 _STRETCH = 0.15
@@ -43,7 +43,7 @@ def refractive_index(medium: Medium | None, wavelength_nm: Floats | float) -> Fl
         label = medium.glass or f"n_d = {medium.n_d:g}"
         raise GlassError(f"the glass {label} has no dispersion: load the lens with load_lens, which attaches one")
     change = dispersion_index(medium.dispersion, wavelength) - dispersion_index(
-        medium.dispersion, np.float64(LINE_D_NM)
+        medium.dispersion, np.float64(D_LINE_NM)
     )
     return np.asarray(medium.n_d + change, dtype=np.float64)
 

@@ -16,6 +16,7 @@ from ...errors import LensError
 from ...kernels.paraxial import ghosts
 from ...model import Lens, Medium, Stop, Surface
 from ...typing import Floats
+from .dispersion import D_LINE_NM as D_LINE_NM  # noqa: PLC0414 (`rays` imports it from here)
 from .dispersion import refractive_index
 from .paths import LightPath, direct_path
 from .surface_shape import curvature_across
@@ -27,7 +28,6 @@ _Index = TypeVar("_Index", float, Floats)
 # a few dozen steps take less time in Python than loading a compiled kernel
 _path_matrices = getattr(ghosts.path_matrices, "py_func", ghosts.path_matrices)
 
-D_LINE_NM = 587.56
 # a power below this part of the surfaces' powers is what rounding leaves of an afocal lens
 AFOCAL = 1e-8
 

@@ -18,7 +18,8 @@ from ...model import Coating, Lens, QuarterWave, Row, Stop, Surface
 from ...model.lens.prescription import NO_GLASS
 from ...model.lens.raw_lens import LensReading, RawLens, RawRow
 from ...typing import Floats
-from ..lens.paraxial import D_LINE_NM, FirstOrder, first_order, path_matrices
+from ..lens.dispersion import D_LINE_NM
+from ..lens.paraxial import FirstOrder, first_order, path_matrices
 from ..lens.paths import direct_path
 from ..rays.single_rays import trace_polylines
 from .sequential_import import order_of

@@ -9,7 +9,8 @@ import numpy as np
 
 from ...model import Lens, Stop, Surface
 from ...typing import Floats
-from ..lens.paraxial import D_LINE_NM, FirstOrder, first_order, path_matrices
+from ..lens.dispersion import D_LINE_NM
+from ..lens.paraxial import FirstOrder, first_order, path_matrices
 from ..lens.paths import direct_path
 from ..lens.surface_shape import ideal, sag, transposed
 from ..rays.single_rays import trace_polylines

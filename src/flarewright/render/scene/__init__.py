@@ -2,7 +2,7 @@
 
 Modules:
 
-- `resolve`: `open_lens`, `load_lens`, `first_order`, `build`, `resolve_project`: a project with its lens built
+- `resolve`: `open_lens`, `load_lens`, `check_opens`, `build`, `resolve_project`: a project with its lens built
   (`ResolvedProject`)
 - `arguments`: `project_of`: a project from the arguments of `render`
 - `opening`: `Opening`, `make_opening`: the iris as the kernels read it

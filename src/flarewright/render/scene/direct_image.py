@@ -11,7 +11,8 @@ from ...kernels.raster.bundle import draw_bundle, measure_bundle, node_densities
 from ...kernels.raster.polygons import blank_plane, to_pixels
 from ...kernels.tracing.sequential import ALIVE, REL, WEIGHT, X, Y
 from ...model import Lens
-from ...optics.lens.paraxial import D_LINE_NM, path_matrices
+from ...optics.lens.dispersion import D_LINE_NM
+from ...optics.lens.paraxial import path_matrices
 from ...optics.lens.paths import direct_path
 from ...optics.rays.bundle import Bundle, Refinement, trace_bundle, trace_grid, trace_points
 from ...optics.rays.pupil_region import find_region

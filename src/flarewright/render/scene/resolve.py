@@ -20,8 +20,7 @@ from ...io.lens.media import remarks as media_remarks
 from ...io.lens.toml_lens import read_lens
 from ...model import AsLens, CoatingChoice, Imperfection, Iris, Lens, Medium, Plate, Project, Surface
 from ...model.lens.raw_lens import LensReading, RawLens, RawSequence
-from ...optics.lens.paraxial import FirstOrder
-from ...optics.lens.paraxial import first_order as _first_order
+from ...optics.lens.paraxial import FirstOrder, first_order
 from ...optics.lens.plane_plates import with_cover_glass, with_filter
 from ...optics.lens.tolerances import imperfect
 from ...optics.lens.zoom import at_position, positioned
@@ -245,40 +244,13 @@ def _with_heights(lens: Lens) -> Lens:
     return lens if all(a is b for a, b in zip(rows, lens.rows, strict=True)) else lens.replace(rows=tuple(rows))
 
 
-def first_order(
-    lens: Lens,
-    f_number: float | None = None,
-    *,
-    sensor_distance: float | None = None,
-    focus_distance: float | None = None,
-) -> FirstOrder:
-    """Compute focal length, pupils, stop and sensor position of a lens.
-
-    Parameters
-    ----------
-    lens : Lens
-    f_number : float, optional
-        None: wide open.
-    sensor_distance, focus_distance : float, optional
-        Override the values of the lens file, mm.
-
-    Returns
-    -------
-    FirstOrder
-
-    Raises
-    ------
-    LensError
-        The lens forms no image by itself.
-    ProjectError
-        The f-number is faster than the lens.
-    """
+def check_opens(lens: Lens, f_number: float | None) -> None:
+    """Raise a ProjectError if an f-number is faster than the lens; None is wide open."""
     if f_number is not None and f_number < lens.f_number * (1.0 - 1e-6):
         raise ProjectError(
             f"f/{f_number:g} is faster than {lens.name} opens (f/{lens.f_number:g}); "
             f"choose f/{lens.f_number:g} or a larger number"
         )
-    return _first_order(lens, f_number, sensor_distance=sensor_distance, focus_distance=focus_distance)
 
 
 @dataclass(frozen=True)
@@ -439,7 +411,7 @@ def resolve_project(project: Project) -> ResolvedProject:
     Raises
     ------
     FlarewrightError
-        As in `open_lens`, `build` and `first_order`.
+        As in `open_lens`, `build`, `check_opens` and `first_order`.
     """
     opened = open_lens(project.lens)
     lens, remarks = opened.lens, list(opened.remarks)
@@ -455,6 +427,7 @@ def resolve_project(project: Project) -> ResolvedProject:
         focus_distance=camera.focus_distance,
     )  # fmt: skip
     lens = built.lens
+    check_opens(lens, project.f_number)
     order = first_order(
         lens, project.f_number, sensor_distance=built.sensor_distance, focus_distance=built.focus_distance
     )

@@ -6,8 +6,9 @@ from ...io.lens.library import library_names
 from ...io.lens.own.facts import maker_of, patent_of
 from ...io.lens.own.record import LONGEST_REMARKS, LensRecord
 from ...model import Surface
+from ...optics.lens.paraxial import first_order
 from ...optics.lens.zoom import at_position
-from ...render.scene.resolve import OpenedLens, first_order, open_lens
+from ...render.scene.resolve import OpenedLens, open_lens
 
 _LONGEST_TEXT = 600
 
