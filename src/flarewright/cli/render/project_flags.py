@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, get_args
 
@@ -23,56 +24,34 @@ from .options.record import RenderOptions
 from .sun_light import sun_field
 from .tracks import pixel_place, with_new_lights
 
-# Flag of each key of a project file, for error messages.
-_FLAG_OF = {
-    "f_number": "--fstop",
-    "iris.blades": "--blades",
-    "iris.rotation_deg": "--rotation",
-    "iris.rounding": "--rounding",
-    "iris.roughness_um": "--roughness",
-    "dirt.dust_per_mm2": "--dust",
-    "dirt.scratches_per_cm2": "--scratches",
-    "dirt.fingerprint": "--fingerprint",
-    "dirt.image": "--dirt-image",
-    "dirt.seed": "--seed",
-    "starburst.size": "--starburst-size",
-    "starburst.spiral_deg": "--starburst-spiral",
-    "scatter.model": "--scatter",
-    "scatter.roughness_nm": "--surface-roughness",
-    "scatter.cleanliness_level": "--cleanliness",
-    "diameter_deg": "--light-diameter",
-    "distance": "--distance",
-    "shape.size_deg": "--light-size",
-    "shape.corners_deg": "--light-polygon",
-    "quality.ringing": "--ringing",
-    "camera.size_px": "--size",
-    "camera.sensor_mm": "--sensor",
-    "camera.sensor_distance": "--sensor-distance",
-    "camera.focus_distance": "--focus",
-    "camera.sensor_reflectance": "--sensor-reflectance",
-    "camera.sensor_grating": "--sensor-grating",
-    "imperfection.ghost_offset_mm": "--ghost-offset",
-    "camera.squeeze": "--squeeze",
-    "quality.mode": "--quality",
-    "quality.wavelengths": "--wavelengths",
-    "quality.paths": "--paths",
-    "quality.orders": "--orders",
-    "quality.order4_limit": "--order4-limit",
-    "quality.seed": "--seed",
-    "quality.reference_error": "--error",
-    "quality.reference_error_of": "--error-of",
-    "quality.reference_samples": "--samples",
-    "quality.reference_from": "--rays-from",
-    "output.layers": "--layers",
-    "output.brightest": "--brightest",
-    "output.colorspace": "--colorspace",
-    "output.ocio_space": "--colorspace",
-    "output.ocio_config": "--ocio",
-    "output.gamut": "--gamut",
-    "output.matte_ranks": "--matte-ranks",
-    "output.matte": "--matte",
-    "intensity": "--intensity",
-}
+# Option that sets each key of a project file; errors on the key name the flag of the option.
+_OPTION_OF = {
+    "f_number": "fstop",
+    "iris.blades": "blades", "iris.rotation_deg": "rotation", "iris.rounding": "rounding",
+    "iris.roughness_um": "roughness",
+    "imperfection.ghost_offset_mm": "ghost_offset",
+    "scatter.model": "scatter", "scatter.roughness_nm": "surface_roughness", "scatter.cleanliness_level": "cleanliness",
+    "intensity": "intensity", "diameter_deg": "light_diameter", "distance": "distance",
+    "shape.size_deg": "light_size", "shape.corners_deg": "light_polygon",
+    "camera.size_px": "size", "camera.sensor_mm": "sensor", "camera.sensor_distance": "sensor_distance",
+    "camera.focus_distance": "focus", "camera.cover_glass": "cover_glass",
+    "camera.sensor_reflectance": "sensor_reflectance", "camera.sensor_grating": "sensor_grating",
+    "camera.squeeze": "squeeze", "camera.desqueeze": "desqueeze",
+    "quality.mode": "quality", "quality.wavelengths": "wavelengths", "quality.paths": "paths",
+    "quality.orders": "orders", "quality.order4_limit": "order4_limit", "quality.ringing": "ringing",
+    "quality.seed": "seed", "quality.reference_error": "error", "quality.reference_error_of": "error_of",
+    "quality.reference_samples": "samples", "quality.reference_from": "rays_from",
+    "dirt.dust_per_mm2": "dust", "dirt.scratches_per_cm2": "scratches", "dirt.fingerprint": "fingerprint",
+    "dirt.image": "dirt_image", "dirt.seed": "seed",
+    "starburst.cats_eye": "cats_eye", "starburst.size": "starburst_size", "starburst.spiral_deg": "starburst_spiral",
+    "output.layers": "layers", "output.brightest": "brightest", "output.gamut": "gamut",
+    "output.compression": "compression", "output.starburst": "no_starburst", "output.matte": "matte",
+    "output.matte_ranks": "matte_ranks",
+    "output.colorspace": "colorspace", "output.ocio_space": "colorspace", "output.ocio_config": "ocio",
+}  # fmt: skip
+# sections that options set key by key; `space_flags` has three keys of the output
+_SECTIONS = ("camera", "quality", "dirt", "starburst", "output")
+_OF_SPACE = ("output.colorspace", "output.ocio_space", "output.ocio_config")
 
 # flags that affect each scatter model; all affect a model that is not listed
 _SCATTER_USES: dict[str, tuple[str, ...]] = {"none": (), "chaumond": (), "abg": ("--cleanliness",)}
@@ -121,9 +100,8 @@ def build_project(flags: RenderOptions) -> Project:
         fields["imperfection"] = {**dict(fields.get("imperfection") or nothing), "ghost_offset_mm": flags.ghost_offset}
     if (iris := _iris(flags, fields["lens"], base)) is not None:
         fields["iris"] = iris
-    for section, changes in _sections(flags).items():
-        given = {key: value for key, value in changes.items() if value is not None}
-        if given:
+    for section in _SECTIONS:
+        if given := _given(flags, section):
             fields[section] = {**(dict(getattr(base, section)) if base else {}), **given}
     if spaces := space_flags(flags, base):
         fields["output"] = {**dict(fields.get("output") or {}), **spaces}
@@ -224,58 +202,21 @@ def check_focus(lens: str | Lens, focus: float | None, sensor_distance: float | 
         raise ProjectError("--focus and --sensor-distance both place the sensor; keep one")
 
 
-def _sections(flags: RenderOptions) -> dict[str, dict[str, Any]]:
-    """Return settings of camera, quality and output from the flags, by section and key."""
-    # a camera's name is resolved in `framing`, which also needs the size of the picture
-    stated = flags.sensor is not None and not is_camera_name(flags.sensor)
-    return {
-        "camera": {
-            "size_px": None if flags.size is None else _size_px(flags.size),
-            "sensor_mm": pair(flags.sensor or "", "--sensor", "36x24 (mm)", "x") if stated else None,
-            "sensor_distance": flags.sensor_distance,
-            "focus_distance": flags.focus,
-            "cover_glass": None if flags.cover_glass is None else parse_plate(flags.cover_glass, "--cover-glass"),
-            "sensor_reflectance": flags.sensor_reflectance,
-            "sensor_grating": None if flags.sensor_grating is None else parse_grating(flags.sensor_grating),
-            "squeeze": flags.squeeze,
-            "desqueeze": True if flags.desqueeze else None,
-        },
-        "quality": {
-            "mode": flags.quality,
-            "wavelengths": flags.wavelengths,
-            "paths": flags.paths,
-            "orders": flags.orders,
-            "order4_limit": flags.order4_limit,
-            "ringing": flags.ringing,
-            "seed": flags.seed,
-            "reference_error": flags.error,
-            "reference_error_of": flags.error_of,
-            "reference_samples": flags.samples,
-            "reference_from": flags.rays_from,
-        },
-        "dirt": {
-            "dust_per_mm2": flags.dust,
-            "scratches_per_cm2": flags.scratches,
-            "fingerprint": flags.fingerprint,
-            "image": None if flags.dirt_image is None else _dirt_image(flags.dirt_image),
-            "seed": flags.seed,
-        },
-        "starburst": {
-            "cats_eye": True if flags.cats_eye else None,
-            "size": flags.starburst_size,
-            "spiral_deg": flags.starburst_spiral,
-        },
-        "output": {
-            "layers": flags.layers,
-            "brightest": flags.brightest,
-            "gamut": flags.gamut,
-            "pixel_type": "half" if flags.half else "float" if flags.float32 else None,
-            "compression": flags.compression,
-            "starburst": False if flags.no_starburst else None,
-            "matte": flags.matte,
-            "matte_ranks": flags.matte_ranks,
-        },
-    }
+def _given(flags: RenderOptions, section: str) -> dict[str, Any]:
+    """Return the settings of a section that the flags set, by key."""
+    found: dict[str, Any] = {}
+    for key, option in _OPTION_OF.items():
+        value = getattr(flags, option)
+        if key.startswith(f"{section}.") and key not in _OF_SPACE and value is not None and value is not False:
+            found[key.partition(".")[2]] = _READERS[key](value) if key in _READERS else value
+    if section == "output" and (flags.half or flags.float32):
+        found["pixel_type"] = "half" if flags.half else "float"
+    return {key: value for key, value in found.items() if value is not None}
+
+
+def _sensor_mm(text: str) -> tuple[float, float] | None:
+    """Return the numbers of `--sensor`; `framing` resolves the name of a camera, with the size of the picture."""
+    return None if is_camera_name(text) else pair(text, "--sensor", "36x24 (mm)", "x")
 
 
 def _size_px(text: str) -> tuple[int, int]:
@@ -292,6 +233,17 @@ def _dirt_image(path: Path) -> str:
     return str(path)
 
 
+# what the texts of options mean; other options hold the setting itself
+_READERS: dict[str, Callable[[Any], Any]] = {
+    "camera.size_px": _size_px,
+    "camera.sensor_mm": _sensor_mm,
+    "camera.cover_glass": lambda text: parse_plate(text, "--cover-glass"),
+    "camera.sensor_grating": parse_grating,
+    "dirt.image": _dirt_image,
+    "output.starburst": lambda omitted: not omitted,
+}
+
+
 def _lights(flags: RenderOptions, base: tuple[Light, ...]) -> list[dict[str, Any]]:
     """Return the lights: those of the flags, else those of the project, with intensities and spectra of the flags."""
     lights = with_new_lights(flags.tracked, known_lights(flags, base))
@@ -302,7 +254,7 @@ def _lights(flags: RenderOptions, base: tuple[Light, ...]) -> list[dict[str, Any
         ("distance", [None if distance == float("inf") else distance for distance in flags.distance]),
     ):
         changes = [{name: value} for value in values]
-        _share_out(_FLAG_OF.get(name, f"--{name}"), changes, lights)
+        _share_out(f"--{name}", changes, lights)
         for light in lights if changes else ():
             # a flag overrides the curves of its value
             overridden = {"intensity": ("intensity",), "spectrum": ("rgb", "temperature_k")}.get(name, ())
@@ -407,15 +359,11 @@ def _iris(flags: RenderOptions, lens: Any, base: Project | None) -> dict[str, An
     mask = None if flags.iris_image is None else str(flags.iris_image)
     if mask is not None and not Path(mask).is_file():
         raise ProjectError(f"--iris-image {mask} {_no_file(mask)}; give a grey PNG or EXR image")
-    changes = {
-        "blades": flags.blades,
-        "rotation_deg": flags.rotation,
-        "rounding": flags.rounding,
-        "mask": mask,
-        "roughness_um": flags.roughness,
-        "roughness_seed": flags.seed if flags.roughness else None,
-    }
-    given = {key: value for key, value in changes.items() if value is not None}
+    given = _given(flags, "iris")
+    if mask is not None:
+        given["mask"] = mask
+    if flags.roughness and flags.seed is not None:
+        given["roughness_seed"] = flags.seed
     if not given:
         return None
     if base is not None and base.iris is not None and flags.lens is None:
@@ -480,8 +428,8 @@ def scatter_flags(
 
 def in_flags(sentence: str) -> str:
     """Replace keys of a project file in a message by flags."""
-    for key, flag in _FLAG_OF.items():
+    for key, option in _OPTION_OF.items():
         found = re.match(rf"(?:lights\[\d+\]\.)?{re.escape(key)}(?:\[\d\])?(?=[ :])", sentence)
         if found:
-            return flag + sentence[found.end() :]
+            return f"--{option.replace('_', '-')}{sentence[found.end() :]}"
     return sentence
