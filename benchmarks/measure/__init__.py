@@ -6,6 +6,7 @@
 - `judge`: `judge` computes the scores of a model at constellations that the fit did not use
 - `rolled`: the same for other light directions
 - `isolated`: single ghosts, and a comparison with Walch's method
+- `lateral_colour`: lateral colour of a single ghost
 - `ablation`: what each layer of the residual is worth in a replay
 - `optical_flow`: plain optical flow, its baseline
 - `planted`: run time with ghosts of a known model

@@ -19,18 +19,19 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from synthetic_camera import Pose, Setup, ghost_layers, poses, project_of, scale_of
 
+from benchmarks.measure.lateral_colour import spread_by_colour, with_lateral_start
 from benchmarks.measure.shoot import setup_of
 from benchmarks.measure.truth import cut_by_frame, footprint, forms_of
 from flarewright.kernels.ghost_model.bezier import BORDER, INNER
 from flarewright.kernels.ghost_model.pupil_mesh import FIRST_DISC, FIRST_I
 from flarewright.measure.compression.order_selection import can_go
 from flarewright.measure.core.parameter_vector import field, frame, with_bounded_controls
-from flarewright.measure.core.parameters import Shape, free_numbers, with_lateral_start
+from flarewright.measure.core.parameters import Shape, free_numbers
 from flarewright.measure.core.views import View
 from flarewright.measure.detection.matching_pursuit import pursue
 from flarewright.measure.fitting.alternating_fit import kinds_of
 from flarewright.measure.fitting.ghost_fit import Fit, refine, render
-from flarewright.measure.fitting.model_growth import grow, spread_by_colour
+from flarewright.measure.fitting.model_growth import grow
 from flarewright.measure.fitting.patches import patches_of
 from flarewright.measure.fitting.settings import Growth
 from flarewright.measure.walch.gradient_descent import circle, descend_gradient, draw_single, window_with_margin

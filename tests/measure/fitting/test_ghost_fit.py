@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.measure.lateral_colour import spread_by_colour, with_lateral_start
 from planted_run import GHOSTS, LARGEST, NOISE, SIZE, SMALL, SMALL_GHOSTS, shape, views
 
 from flarewright.kernels.ghost_model.ghost_mesh import parting_of
 from flarewright.kernels.ghost_model.pupil_mesh import BELOW, FIRST_DISC, FIRST_I, LATERAL, SOFT
 from flarewright.measure.core.parameter_vector import channel_numbers, channel_of
-from flarewright.measure.core.parameters import Shape, free_numbers, with_lateral_start
+from flarewright.measure.core.parameters import Shape, free_numbers
 from flarewright.measure.detection import matching_pursuit
 from flarewright.measure.detection.matching_pursuit import pursue
 from flarewright.measure.detection.rim_voting import RimCandidate, candidates, slopes_of
@@ -18,9 +19,9 @@ from flarewright.measure.fitting.alternating_fit import fit_all, to_model
 from flarewright.measure.fitting.amplitudes import presences
 from flarewright.measure.fitting.detected_ghost import DetectedGhost
 from flarewright.measure.fitting.ghost_fit import refine, render
-from flarewright.measure.fitting.model_growth import grow, spread_by_colour
+from flarewright.measure.fitting.model_growth import grow
 from flarewright.measure.fitting.patches import patches_of
-from flarewright.measure.fitting.settings import FitSettings, Growth, GrowthSettings
+from flarewright.measure.fitting.settings import FitSettings, Growth
 from flarewright.measure.replay.model_image import replay_model
 from flarewright.measure.walch.gradient_descent import (
     circle,
@@ -222,8 +223,7 @@ def test_lateral_colour_stays_within_the_thickness_of_a_ghost(parting):
     thin[:FIRST_I] *= 0.1
     assert parting_of(thin, 0, 0.9, frame) > 5.0 * far
     assert apart is not plain
-    narrow = FitSettings(growth=GrowthSettings(lateral_spread=0.5 * far))
-    assert spread_by_colour(plain, shown, 1, settings=narrow) is plain
+    assert spread_by_colour(plain, shown, 1, spread=0.5 * far) is plain
 
 
 def test_a_search_for_lateral_colour_starts_with_a_spread():

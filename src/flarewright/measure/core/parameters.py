@@ -98,18 +98,6 @@ def stepped(shape: Shape, free: Indices, step: Floats) -> Shape:
     return replace(shape, numbers=numbers)
 
 
-def with_lateral_start(shape: Shape) -> Shape:
-    """Return a shape with start values of lateral colour: half of its border softness becomes wavelength spread.
-
-    The picture is an even function of the spread, so the gradient at zero spread is zero and a fit could not leave it.
-    """
-    numbers = shape.numbers.copy()
-    if not numbers[LATERAL:BELOW].any():
-        numbers[SOFT] *= 0.5
-        numbers[LATERAL : LATERAL + 2] = np.sqrt(numbers[SOFT])
-    return replace(shape, numbers=numbers)
-
-
 def rescaled(shape: Shape, factor: float) -> Shape:
     """Return a shape in units of pixels that are smaller by a factor."""
     numbers = shape.numbers.copy()

@@ -15,8 +15,7 @@ Levenberg-Marquardt method. `alternating_fit.fit_all` combines both until the gh
 - `joint_shapes`: fit of the shapes of all ghosts at once (`fit_shapes_jointly`)
 - `levenberg_marquardt`: the minimizer that all fits share (`minimize`)
 - `lifetimes`: range of views in which a ghost is visible (`visible_range`, `update_ranges`)
-- `model_growth`: frees parameters, and adds discs that cut the pupil, while the cost falls enough (`grow`,
-  `spread_by_colour`)
+- `model_growth`: frees parameters, and adds discs that cut the pupil, while the cost falls enough (`grow`)
 - `normal_equations`: solves normal equations that may be singular (`solution`, `inverse`)
 - `patches`: windows of the views around one ghost, and the residuals there (`patches_of`, `residual_in`, `equations`)
 - `restart`: refits all detected ghosts from plain shapes (`restart_jointly`)

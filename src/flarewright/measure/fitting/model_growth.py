@@ -1,4 +1,4 @@
-"""Increase the complexity of a ghost step by step: free parameters, rims, lateral colour.
+"""Increase the complexity of a ghost step by step: free parameters and rims.
 
 A step stays only if it lowers the cost by at least a set fraction.
 """
@@ -12,11 +12,10 @@ from functools import partial
 
 import numpy as np
 
-from ...kernels.ghost_model.ghost_mesh import parting_of
-from ...kernels.ghost_model.pupil_mesh import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, LATERAL, MOST_DISCS, SOFT
+from ...kernels.ghost_model.pupil_mesh import DISC_NUMBERS, FIRST_DISC, FIRST_G, FIRST_I, MOST_DISCS
 from ...typing import Indices
 from ..core.parallel import map_batched
-from ..core.parameters import Shape, free_numbers, with_lateral_start
+from ..core.parameters import Shape, free_numbers
 from ..core.views import View
 from .ghost_fit import Fit, cost_of, improve, refine
 from .patches import Patch, coarser_patches, patches_of, shows
@@ -83,45 +82,6 @@ def grow(
             break
         found, order = higher, order + 1
     return None if found is None else found[0]
-
-
-def spread_by_colour(
-    fit: Fit, views: Sequence[View], channel: int, *, most: Growth = Growth(), pool: ThreadPoolExecutor | None = None,
-    settings: FitSettings = FitSettings(),
-) -> Fit:  # fmt: skip
-    """Add lateral colour to a ghost, which makes its borders softer on one side.
-
-    Parameters
-    ----------
-    fit : Fit
-        From `grow`.
-    views : sequence of View
-        Their pixels hold this ghost alone: all other known ghosts are subtracted.
-    channel : int
-    most : Growth
-        Only `error` and `alike` are used.
-    pool : executor, optional
-    settings : FitSettings
-
-    Returns
-    -------
-    Fit
-        The given one if the cost does not fall enough or the wavelengths spread too far.
-    """
-    start = with_lateral_start(fit.shape)
-    patches = patches_of(start, views, channel, settings=settings)
-    if fit.shape.numbers[SOFT] < settings.growth.lateral_soft_px**2 or not patches:
-        return fit
-    free = np.union1d(fit.free, np.array([SOFT, LATERAL, LATERAL + 1]))
-    apart = refine(
-        start, patches, free, width=views[0].size_px[0], steps=20, error=most.error, alike=most.alike, pool=pool,
-        settings=settings,
-    )  # fmt: skip
-    shape = apart.shape
-    farthest = max(parting_of(shape.numbers, shape.discs, patch.sigma, patch.frame) for patch in patches)
-    before = cost_of(fit.shape, patches, error=most.error, settings=settings)
-    pays = apart.cost < (1.0 - settings.growth.order_pays) * before
-    return apart if pays and farthest < settings.growth.lateral_spread else fit
 
 
 def _with_rim(

@@ -68,9 +68,7 @@ class GrowthSettings:
     """Steps by which a fit of one ghost gets more parameters, see `model_growth.grow`."""
 
     rim_pays: float = 0.02  # minimum fraction by which a rim must lower the cost
-    order_pays: float = 0.02  # minimum fraction by which a higher order or lateral colour must lower the cost
-    lateral_soft_px: float = 0.5  # minimum softness of borders that can show lateral colour, pixels
-    lateral_spread: float = 0.4  # largest deviation of colours over the least radius; beyond, more than the rim moves
+    order_pays: float = 0.02  # minimum fraction by which a higher order must lower the cost
     rim_centres: tuple[float, ...] = (-2.4, -1.2, -0.6, 0.6, 1.2, 2.4)  # start values of a new rim's centre, over s
     rim_cuts: tuple[float, ...] = (0.3, 0.9)  # start depths of a new rim's cut into the first, over the pupil's radius
     rim_views: int = 8  # number of views that choose the best rim of a first fit
