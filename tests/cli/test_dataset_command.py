@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from flarewright.cli.app import run
-from flarewright.io.project.dataset_file import EXAMPLE
+from flarewright.io.project.file_of_kind import example_file
 
 SPEC = """
 size_px = [64, 48]
@@ -29,7 +29,7 @@ def place(tmp_path, monkeypatch):
 
 def test_the_example_is_printed_and_nothing_else(place, capsys):
     assert run(["dataset", "--example"]) == 0
-    assert capsys.readouterr() == (EXAMPLE, "")
+    assert capsys.readouterr() == (example_file("dataset"), "")
     assert run(["dataset", "--example", "--seed", "3"]) == 2
     assert "--example only prints a specification; leave --seed out" in capsys.readouterr().err
 

@@ -16,7 +16,8 @@ from singlet_file import singlet_file
 from flarewright.cli.app import run
 from flarewright.cli.common import remembered
 from flarewright.errors import FlarewrightError, OutputError, ProjectError
-from flarewright.io.project.scene_file import EXAMPLE, scene_from_data
+from flarewright.io.project.file_of_kind import example_file
+from flarewright.io.project.scene_file import scene_from_data
 from flarewright.io.render_state.flare_cache import read_cache, write_cache
 from flarewright.model.project.scene import Lamp, LampKey, Scene
 from flarewright.optics.lens.field_angles import brightness_scale
@@ -428,7 +429,7 @@ def test_drawn_pictures_are_kept_after_ctrl_c(tmp_path):
 
 def changed(**places):
     """Return the example with values replaced, by dotted path; None removes one."""
-    data = tomllib.loads(EXAMPLE)
+    data = tomllib.loads(example_file("scene"))
     for place, value in places.items():
         *way, last = (int(key) if key.isdigit() else key for key in place.split("__"))
         target = data

@@ -84,7 +84,7 @@ def dataset(options: DatasetOptions) -> None:
 
 
 def _print_example(options: DatasetOptions) -> None:
-    from ..io.project.dataset_file import EXAMPLE
+    from ..io.project.file_of_kind import example_file
 
     idle = _first_given(
         {
@@ -95,7 +95,7 @@ def _print_example(options: DatasetOptions) -> None:
     )  # fmt: skip
     if idle is not None:
         raise ProjectError(f"--example only prints a specification; leave {idle} out")
-    sys.stdout.write(EXAMPLE)
+    sys.stdout.write(example_file("dataset"))
 
 
 def _first_given(values: dict[str, object]) -> str | None:

@@ -24,8 +24,9 @@ from flarewright.io.measurement.ghost_model_file import (
     read_replay_camera,
 )
 from flarewright.io.measurement.merged import read_run
+from flarewright.io.project.file_of_kind import example_file
 from flarewright.io.project.project_file import project_from_data
-from flarewright.io.project.scene_file import EXAMPLE, scene_from_data
+from flarewright.io.project.scene_file import scene_from_data
 
 PYTHON = re.compile(
     r"[Ii]nput should|valid (?:string|number|integer|boolean|tuple|dictionary|list|datetime)|\btuple\b|\bdict\b|\bstr\b"
@@ -414,7 +415,7 @@ def test_no_field_of_a_toml_file_is_refused_in_words_of_python(kind, every, tmp_
     text, read = {
         "lens": (LENS, lambda data: lens_from_table(data, "the file", folder=tmp_path)),
         "project": (PROJECT, lambda data: project_from_data(data, folder=tmp_path, where="the file")),
-        "scene": (EXAMPLE, lambda data: scene_from_data(data, folder=tmp_path, where="the file")),
+        "scene": (example_file("scene"), lambda data: scene_from_data(data, folder=tmp_path, where="the file")),
     }[kind]
     data = tomllib.loads(text)
     read(data)

@@ -6,7 +6,7 @@ import pytest
 
 from flarewright import read_dataset_spec
 from flarewright.errors import FlarewrightError
-from flarewright.io.project.dataset_file import EXAMPLE
+from flarewright.io.project.file_of_kind import example_file
 from flarewright.model.project.distribution import Choice, Constant, LogUniform, Uniform
 
 BASE = '[lens]\nnames = ["heliar-tronnier", "triplet-pestrecov"]\n'
@@ -18,7 +18,7 @@ def spec_of(tmp_path, text):
 
 
 def test_the_example_can_be_read_and_says_what_it_means(tmp_path):
-    spec = spec_of(tmp_path, EXAMPLE)
+    spec = spec_of(tmp_path, example_file("dataset"))
     assert spec.lens.stops_down == Uniform(uniform=(0.0, 4.0))
     assert spec.iris.blades == Choice(choice=(0.0, 5.0, 6.0, 7.0, 8.0, 9.0))
     assert spec.lights.diameter_deg == Constant(constant=0.0)

@@ -20,12 +20,13 @@ def init(
     force: Force = False,
 ) -> None:
     """Write a scene with two cameras, the sun and a lamp, and a comment on every key."""
-    from ...io.project.scene_file import EXAMPLE
+    from ...io.project.file_of_kind import example_file
 
+    example = example_file("scene")
     if output is None:
-        print(EXAMPLE, end="")
+        print(example, end="")
         return
     check_place(output, ".toml")
     check_free(output, force)
-    write_text(output, EXAMPLE)
+    write_text(output, example)
     print_remarks([f"wrote {output}"])

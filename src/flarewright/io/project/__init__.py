@@ -1,7 +1,7 @@
 """Project, scene, look and data set files, and the text forms of spectra.
 
 - `camera_list`: `camera_formats`, `camera_format`, active areas of cameras by name
-- `file_of_kind`: `read_file_of_kind`, the TOML of a project, a scene or a specification
+- `file_of_kind`: `read_file_of_kind`, the TOML of a project, a scene or a specification; `example_file`
 - `dataset_file`: `read_dataset_spec`, distributions of training pairs
 - `look_file`: `read_look`, `look_text`, `shipped_looks`
 - `named_files`: `picture_files`, the pictures that a project or a lens names

@@ -7,20 +7,16 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
-from ...errors import FlarewrightError, ProjectError, raised_as
+from ...errors import FlarewrightError, ProjectError
 from ...model.project import dataset as records
 from ...model.project import distribution as distributions
 from ...model.project.dataset import DatasetSpec
 from ..files.sentences import summary
-from ..files.text_file import check_version
 from ..files.type_slips import record_of
 from ..lens.coating_text import parse_coating_choice
 from .file_of_kind import read_file_of_kind
 from .project_file import Sections, lens_location, validation_messages
-
-_NEWEST = 1
 
 _ANY = tuple(distributions.KINDS.values())
 _SECTIONS: Sections = {
@@ -44,68 +40,6 @@ _SECTIONS |= {
     for name in kind.model_fields
     if name not in _SECTIONS
 }
-
-EXAMPLE = """\
-# Training pairs for the removal and the detection of lens flare; docs/datasets.md.
-# A value is a number, a list of choices, or a distribution:
-#   { choice = [2.8, 8.0], weights = [3, 1] }   { uniform = [0, 1] }    { log_uniform = [1, 100] }
-#   { normal = [0, 1], bounds = [-2, 2] }       { integers = [5, 9] }
-schema_version = 1
-seed = 1
-size_px = [512, 512]
-quality = "draft"         # or "final": traced rays; then also: rings
-layout = "webdataset"     # or "folder", "flare7k"
-items_per_shard = 250
-format = "png"            # or "png16", "jpeg", "exr"
-light_in_clean = "core"   # or "image", "none"
-# parts = ["clean", "flared", "ghosts", "starburst", "light_mask", "ghost_mask"]   # default: all
-
-[lens]
-names = ["heliar-tronnier", "takumar-50-f1.4", "flektogon-35", "nikkor-85-f1.4", "canon-70-200", "triplet-pestrecov"]
-stops_down = { uniform = [0, 4] }   # or f_number
-zoom = { uniform = [0, 1] }         # 0 is the shortest focal length, 1 the longest
-coating = { choice = ["lens", "early-multicoat", "quarter-wave:550", "none"], weights = [4, 3, 2, 1] }
-sensor_width_mm = 24.0
-
-[iris]
-blades = [0, 5, 6, 7, 8, 9]
-rounding = { uniform = [0, 0.6] }
-repeat = 25   # items in sequence that share an iris; its diffraction pattern takes a third of a second
-
-[dirt]   # in the pupil; an item with dirt takes half a second longer
-dust_per_mm2 = { choice = [0, 0.5], weights = [9, 1] }
-scratches_per_cm2 = 0.0
-
-[lights]
-count = { choice = [1, 2, 3], weights = [6, 2, 1] }
-place = { kind = "frame", margin = 0.1 }   # or "field", with x_deg and y_deg
-stops = { normal = [0, 2], bounds = [-4, 4] }   # irradiance over pi times the mean luminance of the background
-temperature_k = { log_uniform = [2700, 6500] }
-diameter_deg = 0.0
-
-[background]
-# folder = "backgrounds"          # default: synthetic pictures
-# crop = { uniform = [0.5, 1] }   # with a folder; also: flip
-
-[exposure]
-stops = { normal = [-0.5, 0.7], bounds = [-2, 1] }
-
-[sensor]
-full_well_e = { log_uniform = [2000, 40000] }
-read_noise_e = { uniform = [1, 5] }
-tone = "srgb"
-# jpeg_quality = { integers = [75, 98] }
-
-[masks]
-ghosts = 8
-threshold = 0.002
-
-[splits]   # by lens: weights, or names
-train = 4
-val = 1
-test = 1
-"""
-"""The file that `flarewright dataset --example` prints."""
 
 
 def read_dataset_spec(path: str | os.PathLike[str]) -> DatasetSpec:
@@ -132,15 +66,7 @@ def read_dataset_spec(path: str | os.PathLike[str]) -> DatasetSpec:
     >>> spec = read_dataset_spec("pairs.toml")                                          # doctest: +SKIP
     """
     path = Path(path)
-    data = read_file_of_kind(path, "dataset", "a specification of a data set")
-    return dataset_from_data(data, folder=path.parent, where=str(path))
-
-
-def dataset_from_data(data: dict[str, Any], *, folder: Path, where: str) -> DatasetSpec:
-    """Return the specification of parsed TOML; parameters and errors as `project_file.project_from_data`."""
-    with raised_as(ProjectError):
-        check_version(data, _NEWEST, f"the specification {where}")
-    out = dict(data)
+    folder, out = path.parent, read_file_of_kind(path, "dataset")
     table = out.get("background")
     if isinstance(table, dict) and isinstance(table.get("folder"), str):
         out["background"] = {**table, "folder": str(folder / table["folder"])}
@@ -151,7 +77,7 @@ def dataset_from_data(data: dict[str, Any], *, folder: Path, where: str) -> Data
         problems += _text_problems(spec, folder)
         problems += [*contradictions(spec), *_idle(spec)]
     if spec is None or problems:
-        raise ProjectError(summary(where, problems), tuple(problems))
+        raise ProjectError(summary(str(path), problems), tuple(problems))
     return _resolved(spec, folder)
 
 

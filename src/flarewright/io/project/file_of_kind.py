@@ -1,24 +1,27 @@
-"""Read a TOML file that must be of one of our kinds."""
+"""Read a TOML file that must be of one of our kinds, and examples of such files."""
 
 from __future__ import annotations
 
+from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from ...errors import ProjectError, raised_as
 from ..files.file_kind import Kind, refuse_lens_suffix, refuse_other_kind
-from ..files.text_file import read_toml
+from ..files.text_file import check_version, read_text, read_toml
+
+NEWEST = 1
+"""Largest `schema_version` of a file that this program reads."""
+_NAMES: dict[Kind, str] = {"project": "project file", "scene": "scene file", "dataset": "specification"}
 
 
-def read_file_of_kind(path: Path, kind: Kind, what: str) -> dict[str, Any]:
+def read_file_of_kind(path: Path, kind: Kind) -> dict[str, Any]:
     """Return the parsed contents of a TOML file.
 
     Parameters
     ----------
     path : Path
     kind : {"dataset", "project", "scene"}
-    what : str
-        For messages: "a project file".
 
     Returns
     -------
@@ -27,10 +30,17 @@ def read_file_of_kind(path: Path, kind: Kind, what: str) -> dict[str, Any]:
     Raises
     ------
     ProjectError
-        The file cannot be read, or is clearly of another kind.
+        The file cannot be read, is clearly of another kind, or is one of a newer program.
     """
+    name = _NAMES[kind]
     with raised_as(ProjectError):
         refuse_lens_suffix(path, kind)
-        data = read_toml(path, what)
+        data = read_toml(path, f"a {name}{' of a data set' if kind == 'dataset' else ''}")
         refuse_other_kind(path, data, kind)
+        check_version(data, NEWEST, f"the {name} {path}")
     return data
+
+
+def example_file(kind: Literal["dataset", "scene"]) -> str:
+    """Return an example of a file, with a comment on every key: what `scene init` and `dataset --example` print."""
+    return read_text(str(files("flarewright").joinpath(f"io/data/{kind}.toml")), "an example")

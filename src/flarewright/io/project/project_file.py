@@ -21,7 +21,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from ...errors import FlarewrightError, LensError, ProjectError, raised_as
+from ...errors import FlarewrightError, LensError, ProjectError
 from ...model.lens import coating as coatings
 from ...model.lens import scatter as scatters
 from ...model.lens.imperfection import Imperfection
@@ -39,7 +39,6 @@ from ...model.project.camera import Camera
 from ...model.project.holdout import Holdout
 from ...model.project.project import Output, Project, Quality
 from ..files.sentences import Keys, did_you_mean, shorten, summary, validation_sentences
-from ..files.text_file import check_version
 from ..files.type_slips import record_of
 from ..lens.coating_text import coating_from, parse_coating, parse_coating_choice
 from ..lens.plate_text import parse_plate
@@ -63,8 +62,6 @@ __all__ = [
 
 Sections = dict[str, tuple[type[BaseModel], ...]]
 
-_NEWEST = 1
-
 
 def read_project(path: str | os.PathLike[str]) -> Project:
     """Read and check a project file.
@@ -85,10 +82,7 @@ def read_project(path: str | os.PathLike[str]) -> Project:
         When the file cannot be read or has errors; `problems` then lists all of them.
     """
     path = Path(path)
-    data = read_file_of_kind(path, "project", "a project file")
-    with raised_as(ProjectError):
-        check_version(data, _NEWEST, f"the project file {path}")
-    return project_from_data(data, folder=path.parent, where=str(path))
+    return project_from_data(read_file_of_kind(path, "project"), folder=path.parent, where=str(path))
 
 
 def project_from_data(data: dict[str, Any], *, folder: Path, where: str) -> Project:

@@ -18,11 +18,9 @@ from ...model.project.scene import Scene
 from ..files.sentences import shorten, summary
 from ..files.text_file import check_version
 from ..files.type_slips import record_of
-from .file_of_kind import read_file_of_kind
+from .file_of_kind import NEWEST, read_file_of_kind
 from .project_file import Sections, accept_text, expand_coating, expand_light, lens_location, validation_messages
 from .project_text import ABOUT
-
-_NEWEST = 1
 
 _SECTIONS: Sections = {
     "": (Scene,),
@@ -34,58 +32,6 @@ _SECTIONS: Sections = {
     "coating": (choices.Preset, choices.Everywhere, choices.InTurn, choices.PerRow),
     "spectrum": (spectra.BlackBody, spectra.Lines, spectra.Tabulated, spectra.Rgb),
 }
-
-EXAMPLE = """\
-# A scene for light planning; metres, x right and y up in the plan, z to the sky. docs/predict.md
-schema_version = 1
-name = "Evening match"
-luminance_cd_m2 = [1.0, 200.0]   # darkest and brightest that the cameras see; default: no contrast is reported
-north_deg = 0.0   # compass direction of y
-
-[site]   # for the sun
-latitude_deg = 48.21
-longitude_deg = 16.37
-
-[time]
-start = 2024-06-21T18:00:00+02:00
-duration_s = 9000.0
-step_s = 600.0
-
-[[cameras]]
-name = "east stand"
-lens = "flektogon-35"   # or a lens file; or model = "compact.json", a measured flare, with unit_per_cd_m2
-position_m = [60.0, 0.0, 15.0]
-aim_m = [0.0, 0.0, 0.0]
-f_number = 4.0
-coating = "quarter-wave:550"
-iso = 400.0
-exposure_s = 0.002
-
-[[cameras]]
-name = "south goal"
-lens = "nikkor-85-f1.4"
-position_m = [5.0, -70.0, 4.0]
-aim_m = [0.0, -20.0, 1.0]
-f_number = 2.8
-coating = "quarter-wave:550"
-[[cameras.keyframes]]   # pans to the centre within ten minutes
-at_s = 600.0
-aim_m = [0.0, 0.0, 1.0]
-
-[[lights]]
-kind = "sun"
-
-[[lights]]
-kind = "lamp"
-name = "north mast"
-position_m = [-40.0, 60.0, 40.0]
-intensity_cd = 2e6   # or luminance_cd_m2 with diameter_m
-diameter_m = 0.6
-aim_m = [0.0, 0.0, 0.0]
-beam_deg = 40.0   # half of the intensity at 20 degrees from the aim
-spectrum = "black-body:5000"
-"""
-"""The file that `flarewright scene init` writes."""
 
 
 def read_scene(path: str | os.PathLike[str]) -> Scene:
@@ -107,14 +53,14 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
         When the file cannot be read or has errors; `problems` then lists all of them, each with its place.
     """
     path = Path(path)
-    data = read_file_of_kind(path, "scene", "a scene file")
+    data = read_file_of_kind(path, "scene")
     return scene_from_data(data, folder=path.parent, where=str(path))
 
 
 def scene_from_data(data: dict[str, Any], *, folder: Path, where: str) -> Scene:
     """Return the scene of parsed TOML; parameters and errors as `project_file.project_from_data`."""
     with raised_as(ProjectError):
-        check_version(data, _NEWEST, f"the scene file {where}")
+        check_version(data, NEWEST, f"the scene file {where}")
     problems: list[str] = []
     out = dict(data)
     if isinstance(out.get("cameras"), list):
