@@ -77,9 +77,7 @@ def remove_ghost_target(project: Project, number: int, before: dict[str, Any] | 
     -------
     Project
     """
-    design = project.design
-    if design is None or not 0 <= number < len(design.ghost_targets):
-        raise ProjectError(f"there is no target {number}")
+    design = _design_with(project, number)
     left = tuple(ghost_target for k, ghost_target in enumerate(design.ghost_targets) if k != number)
     if before is not None and _any_new(design.ghost_targets) and not _any_new(left):
         design = design.replace(**before)
@@ -88,9 +86,7 @@ def remove_ghost_target(project: Project, number: int, before: dict[str, Any] | 
 
 def set_new_ghost_target(project: Project, number: int, values: dict[str, Any]) -> Project:
     """Change a target by its number."""
-    design = project.design
-    if design is None or not 0 <= number < len(design.ghost_targets):
-        raise ProjectError(f"there is no target {number}")
+    design = _design_with(project, number)
     ghost_targets = list(design.ghost_targets)
     ghost_targets[number] = ghost_targets[number].replace(**values)
     return _with(project, design, tuple(ghost_targets))
@@ -118,6 +114,13 @@ def ghost_target_names(design: Design) -> tuple[str, ...]:
         new += ghost_target.ghost is None
         names.append(f"added ghost {new}" if ghost_target.ghost is None else f"ghost {ghost_target.ghost}")
     return tuple(names)
+
+
+def _design_with(project: Project, number: int) -> Design:
+    """Return the design, which must have a target of a number."""
+    if project.design is None or not 0 <= number < len(project.design.ghost_targets):
+        raise ProjectError(f"there is no target {number}")
+    return project.design
 
 
 def _any_new(ghost_targets: tuple[GhostTarget, ...]) -> bool:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from ...errors import ProjectError
-from ...model import Light, LightKey, Project
+from ...model import LightKey, Project
 from ...workflow.keyframes import project_at
+from .shot import light_of
 
 # time step of keys: two times within half a step belong to the same key
 STEP_S = 0.01
@@ -22,7 +23,7 @@ def go_to(project: Project, at_s: float) -> Project:
 
 def set_key(project: Project, light: int, at_s: float, field_deg: list[float] | None = None) -> Project:
     """Set a key of a light at a time, at its present or given angles; an existing key is moved."""
-    chosen = _light(project, light)
+    chosen = light_of(project, light)
     at_s = round(max(float(at_s), 0.0) / STEP_S) * STEP_S
     place = chosen.field_deg if field_deg is None else tuple(field_deg)
     new = LightKey(at_s=round(at_s, 6), field_deg=place)
@@ -34,7 +35,7 @@ def move_key(project: Project, light: int, number: int, at_s: float) -> Project:
     """Change the time of a key; two keys cannot have the same time."""
     key = _key(project, light, number)
     at_s = round(round(max(float(at_s), 0.0) / STEP_S) * STEP_S, 6)
-    others = [each for k, each in enumerate(_light(project, light).keyframes) if k != number]
+    others = [each for k, each in enumerate(light_of(project, light).keyframes) if k != number]
     if any(abs(each.at_s - at_s) <= 0.5 * STEP_S for each in others):
         raise ProjectError(f"there is a key at {at_s:g} s already; move or remove it first")
     return _with_keys(project, light, [*others, key.replace(at_s=at_s)])
@@ -43,23 +44,17 @@ def move_key(project: Project, light: int, number: int, at_s: float) -> Project:
 def remove_key(project: Project, light: int, number: int) -> Project:
     """Remove a key."""
     gone = _key(project, light, number)
-    return _with_keys(project, light, [key for key in _light(project, light).keyframes if key is not gone])
+    return _with_keys(project, light, [key for key in light_of(project, light).keyframes if key is not gone])
 
 
 def clear_keys(project: Project, light: int) -> Project:
     """Remove the whole path; the light stays where it is."""
-    _light(project, light)
+    light_of(project, light)
     return _with_keys(project, light, [])
 
 
-def _light(project: Project, light: int) -> Light:
-    if not 0 <= light < len(project.lights):
-        raise ProjectError(f"there is no light {light}; they count from 0 to {len(project.lights) - 1}")
-    return project.lights[light]
-
-
 def _key(project: Project, light: int, number: int) -> LightKey:
-    keys = _light(project, light).keyframes
+    keys = light_of(project, light).keyframes
     if not 0 <= number < len(keys):
         raise ProjectError(f"there is no key {number}; the path has {len(keys)}")
     return keys[number]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from pydantic import ValidationError
@@ -27,12 +28,12 @@ COMMANDS: dict[str, tuple[str, Command]] = {
     "set_holdout": ("Change the occluder", shot.set_holdout),
     "set_plate": ("Change the plate", plate.set_plate),
     "remove_plate": ("Remove the plate", plate.remove_plate),
-    "set_camera": ("Change the camera", shot.set_camera),
-    "set_quality": ("Change the quality", shot.set_quality),
+    "set_camera": ("Change the camera", partial(shot.set_section, "camera")),
+    "set_quality": ("Change the quality", partial(shot.set_section, "quality")),
     "set_fields": ("Change the opening", shot.set_fields),
     "set_iris": ("Change the iris", shot.set_iris),
-    "set_dirt": ("Change the dirt", shot.set_dirt),
-    "set_starburst": ("Change the starburst", shot.set_starburst),
+    "set_dirt": ("Change the dirt", partial(shot.set_section, "dirt")),
+    "set_starburst": ("Change the starburst", partial(shot.set_section, "starburst")),
     "set_pass_gain": ("Grade a pass", shot.set_pass_gain),
     "set_coating": ("Coat the lens", shot.set_coating),
     "put_look": ("Apply a look", shot.put_look),

@@ -24,17 +24,22 @@ def move_light(project: Project, light: int, x: float, y: float) -> Project:
     return set_light(project, light, {"field_deg": held})
 
 
+def light_of(project: Project, light: int) -> Light:
+    """Return a light by its number; raises ProjectError if there is none."""
+    if not 0 <= light < len(project.lights):
+        raise ProjectError(f"there is no light {light}; they count from 0 to {len(project.lights) - 1}")
+    return project.lights[light]
+
+
 def set_light(project: Project, light: int, values: dict[str, Any]) -> Project:
     """Change fields of a light; `spectrum` has the syntax of the command line."""
-    lights = list(project.lights)
-    if not 0 <= light < len(lights):
-        raise ProjectError(f"there is no light {light}; they count from 0 to {len(lights) - 1}")
+    old, lights = light_of(project, light), list(project.lights)
     changes = dict(values)
     if isinstance(changes.get("spectrum"), str):
         changes["spectrum"] = parse_spectrum(changes["spectrum"])
     if changes.get("diameter_deg"):
         changes["shape"] = None
-    lights[light] = lights[light].replace(**changes)
+    lights[light] = old.replace(**changes)
     return project.replace(lights=tuple(lights))
 
 
@@ -56,14 +61,9 @@ def remove_light(project: Project, light: int) -> Project:
     return project.replace(lights=tuple(one for k, one in enumerate(project.lights) if k != light))
 
 
-def set_camera(project: Project, values: dict[str, Any]) -> Project:
-    """Change fields of the camera; if only the picture's width changes, the sensor keeps its shape."""
-    return project.replace(camera=project.camera.replace(**values))
-
-
-def set_quality(project: Project, values: dict[str, Any]) -> Project:
-    """Change fields of the quality."""
-    return project.replace(quality=project.quality.replace(**values))
+def set_section(section: str, project: Project, values: dict[str, Any]) -> Project:
+    """Change fields of a section; if only the picture's width changes, the sensor keeps its shape."""
+    return project.replace(**{section: getattr(project, section).replace(**values)})
 
 
 def set_fields(project: Project, values: dict[str, Any]) -> Project:
@@ -112,9 +112,7 @@ def set_holdout(project: Project, light: int | None, values: dict[str, Any] | No
     -------
     Project
     """
-    if light is not None and not 0 <= light < len(project.lights):
-        raise ProjectError(f"there is no light {light}; they count from 0 to {len(project.lights) - 1}")
-    old = project.holdout if light is None else project.lights[light].holdout
+    old = project.holdout if light is None else light_of(project, light).holdout
     new: Holdout | None = None
     if values is not None:
         changes = dict(values)
@@ -124,16 +122,6 @@ def set_holdout(project: Project, light: int | None, values: dict[str, Any] | No
             changes |= {"image": None, "invert": False}
         new = Holdout(**changes) if old is None else old.replace(**changes)
     return project.replace(holdout=new) if light is None else set_light(project, light, {"holdout": new})
-
-
-def set_dirt(project: Project, values: dict[str, Any]) -> Project:
-    """Change dust, scratches and other dirt."""
-    return project.replace(dirt=project.dirt.replace(**values))
-
-
-def set_starburst(project: Project, values: dict[str, Any]) -> Project:
-    """Change the starburst settings."""
-    return project.replace(starburst=project.starburst.replace(**values))
 
 
 def set_pass_gain(project: Project, name: str, gain: float) -> Project:

@@ -13,7 +13,7 @@ import threading
 import traceback
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from functools import partial, wraps
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -73,42 +73,38 @@ class Left(Exception):  # noqa: N818 (not an error: no client awaits the result)
     """Raised inside a work whose client has left."""
 
 
-def reported(work: Work) -> Callable[[Workspace], Answer]:
-    """Turn a function of request and body into a handler: its result as JSON, its error as one sentence.
+def _handler(work: Work, workspace: Workspace) -> Answer:
+    """Return the handler of a function of request and body: its result as JSON, its error as one sentence.
 
     The body is a JSON object, or the bytes of a file.
     """
 
-    def bind(workspace: Workspace) -> Answer:
-        @wraps(work)
-        async def answer(request: Request) -> Response:
-            post = request.method == "POST"
-            try:
-                raw = await request.body() if post else b""
-                body: Any = raw if work is _import else object_of(raw)
+    async def answer(request: Request) -> Response:
+        post = request.method == "POST"
+        try:
+            raw = await request.body() if post else b""
+            body: Any = raw if work is _import else object_of(raw)
 
-                def asked(left: threading.Event) -> Any:
-                    request.state.left = left
-                    return work(workspace, request, body)
+            def asked(left: threading.Event) -> Any:
+                request.state.left = left
+                return work(workspace, request, body)
 
-                turns = workspace.changes if post else workspace.questions
-                result = await turns.run_for(asked, partial(_left, request))
-            except HTTPException:
-                raise
-            except Crowded:
-                return _error(CROWDED, 503)
-            except (asyncio.CancelledError, Left):
-                # the server ends, or the client has left
-                return _error(ENDED, 503)
-            except Exception as error:
-                return _error(_sentence(workspace, error), 400)
-            if isinstance(result, Response):
-                return result
-            return JSONResponse(result if result is not None else {})
+            turns = workspace.changes if post else workspace.questions
+            result = await turns.run_for(asked, partial(_left, request))
+        except HTTPException:
+            raise
+        except Crowded:
+            return _error(CROWDED, 503)
+        except (asyncio.CancelledError, Left):
+            # the server ends, or the client has left
+            return _error(ENDED, 503)
+        except Exception as error:
+            return _error(_sentence(workspace, error), 400)
+        if isinstance(result, Response):
+            return result
+        return JSONResponse(result if result is not None else {})
 
-        return answer
-
-    return bind
+    return answer
 
 
 async def _left(request: Request) -> None:
@@ -473,9 +469,9 @@ def make_app(workspace: Workspace, access: Access) -> Starlette:
     """
     file = [Middleware(RequestBodyLimitMiddleware, max_body_size=MOST_BYTES)]
     routes: list[Any] = [Route("/", _index)]
-    routes += [Route(path, reported(work)(workspace), methods=["GET"]) for path, work in _GET.items()]
+    routes += [Route(path, _handler(work, workspace), methods=["GET"]) for path, work in _GET.items()]
     routes += [
-        Route(path, reported(work)(workspace), methods=["POST"], middleware=file if path == IMPORT else None)
+        Route(path, _handler(work, workspace), methods=["POST"], middleware=file if path == IMPORT else None)
         for path, work in _POST.items()
     ]
     routes += [WebSocketRoute("/ws", workspace.socket), WebSocketRoute("/ws/moving", partial(_follow, workspace))]
