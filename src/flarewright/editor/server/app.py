@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import errno
-import json
 import logging
 import signal
 import sys
 import tempfile
 import threading
-import traceback
-from collections.abc import Awaitable, Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,42 +25,34 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
-from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from ...errors import FlarewrightError, ProjectError
+from ...errors import ProjectError
 from ...io.images.thumbnails import thumbnail
 from ...io.lens.library import is_own
-from ...model import Project
 from ...workflow.own_library.thumbnails import read_thumbnail
-from ..commands.light_path import go_to
-from ..commands.shot import move_light
 from ..preview import diagrams, queries
-from ..preview.drag import Moved
 from ..preview.ghost_picking import ghost_csv
 from ..preview.viewport import packed_pixels, shown_pixels
 from ..session import files
-from ..session.image_files import in_short
 from ..session.plate_finder import outlined
 from .access import Access, Guard, SafeHeaders
-from .messages import brief, object_of
+from .drag_socket import change_of, follow
+from .messages import CROWDED, object_of, why_failed
 from .page_state import ghost_rows
 from .turns import Crowded
 from .uploads import MOST_BYTES, take_in
-from .workspace import MOST_SOCKETS, TRY_AGAIN, Workspace, delivered, received
+from .workspace import Workspace
 
 STATIC = Path(__file__).parents[1] / "static"
 IMPORT = "/api/import"
 MOST_SECONDS = 3600.0
 # largest body of a request, except of a dropped file, and largest message of a socket, bytes
 MOST_BODY, MOST_MESSAGE = 2**20, 2**16
-# pictures of a drag that one page has drawn at the same time; of further requests the newest waits
-AT_ONCE = 2
 # pictures are compressed already; answers in progress have a moment, in seconds, when the server ends
 SERVER: dict[str, Any] = {
     "ws": "websockets-sansio", "ws_per_message_deflate": False, "ws_max_size": MOST_MESSAGE,
     "timeout_graceful_shutdown": 0.2, "log_level": "warning", "lifespan": "off", "proxy_headers": False,
 }  # fmt: skip
-CROWDED = "the editor has too many unanswered requests; try again in a moment"
 ENDED = "the editor has ended"
 
 Answer = Callable[[Request], Awaitable[Response]]
@@ -99,7 +89,7 @@ def _handler(work: Work, workspace: Workspace) -> Answer:
             # the server ends, or the client has left
             return _error(ENDED, 503)
         except Exception as error:
-            return _error(_sentence(workspace, error), 400)
+            return _error(why_failed(error, workspace.session), 400)
         if isinstance(result, Response):
             return result
         return JSONResponse(result if result is not None else {})
@@ -115,16 +105,6 @@ async def _left(request: Request) -> None:
 
 def _error(words: str, status: int) -> Response:
     return JSONResponse({"error": words}, status_code=status)
-
-
-def _sentence(workspace: Workspace, error: Exception) -> str:
-    """Return one sentence on why a request failed."""
-    if isinstance(error, FlarewrightError):
-        return in_short(str(error), workspace.session.project, workspace.session.file)
-    if not isinstance(error, ValueError | LookupError | TypeError | ArithmeticError | AttributeError | OSError):
-        # a bug, which a page can cause but not mend
-        traceback.print_exception(error)
-    return f"the editor did not understand the page: {brief(str(error) or type(error).__name__)}"
 
 
 async def _refused(_request: Request, error: Exception) -> Response:
@@ -169,97 +149,11 @@ def _picture(workspace: Workspace, _request: Request, _body: Any) -> Any:
     return sent
 
 
-def _move(workspace: Workspace, asked: Mapping[str, Any]) -> tuple[Callable[[Project], Project], int]:
-    """Return the change that a drag or playback requests, and the revision that it refers to."""
-    revision = int(asked.get("revision", workspace.session.revision))
-    if "at" in asked:
-        return partial(go_to, at_s=float(asked["at"])), revision
-    return partial(move_light, light=int(asked["light"]), x=float(asked["x"]), y=float(asked["y"])), revision
-
-
-def _moved(workspace: Workspace, asked: Mapping[str, Any]) -> Moved | None:
-    """Draw the project with a moved light, or at a time of its path."""
-    return workspace.drag.picture(*_move(workspace, asked))
-
-
-async def _follow(workspace: Workspace, socket: WebSocket) -> None:
-    """Answer requests of a drag: a line of JSON, then the picture.
-
-    A socket costs less per picture than requests. Of requests that come faster than pictures the newest is drawn; the
-    others get no picture. If the page closes during a drag, the drag ends: the project's own picture is restored,
-    unless a drag of another page is newer.
-    """
-    await socket.accept()
-    if workspace.following >= MOST_SOCKETS:
-        await socket.close(TRY_AGAIN)
-        return
-    workspace.following += 1
-    tasks: set[asyncio.Task[None]] = set()
-    waiting: dict[str, Any] | None = None
-
-    async def send(head: dict[str, Any], picture: bytes = b"") -> None:
-        # the tab may be closed by now
-        await delivered(socket, json.dumps(head).encode() + b"\n" + picture)
-
-    async def answer(asked: dict[str, Any]) -> None:
-        head: dict[str, Any] = {"number": asked.get("number")}
-        picture = b""
-        workspace.followed = socket
-        try:
-            found = await workspace.drags.run(partial(_moved, workspace, asked))
-            if found is not None:
-                picture = found.jpeg
-                head |= {"seconds": round(found.seconds, 4), "lights": [one.field_deg for one in found.project.lights]}
-        except Crowded:
-            head["error"] = CROWDED
-        except Exception as error:
-            head["error"] = _sentence(workspace, error)
-        await send(head, picture)
-
-    def begin(asked: dict[str, Any]) -> None:
-        task = asyncio.create_task(answer(asked))
-        tasks.add(task)
-        task.add_done_callback(ended)
-
-    def ended(task: asyncio.Task[None]) -> None:
-        nonlocal waiting
-        tasks.discard(task)
-        if waiting is not None:
-            asked, waiting = waiting, None
-            begin(asked)
-
-    try:
-        while True:
-            raw = await received(socket)
-            try:
-                asked = object_of(raw)
-            except ValueError as error:
-                await send({"number": None, "error": _sentence(workspace, error)})
-                continue
-            if len(tasks) < AT_ONCE:
-                begin(asked)
-                continue
-            stale, waiting = waiting, asked
-            if stale is not None:
-                await send({"number": stale.get("number")})
-    except WebSocketDisconnect:
-        pass
-    finally:
-        workspace.following -= 1
-        waiting = None
-        # wait for the picture in progress, which would otherwise interrupt the final one
-        with suppress(asyncio.CancelledError, Crowded):
-            await asyncio.gather(*tasks, return_exceptions=True)
-            if workspace.followed is socket:
-                workspace.followed = None
-                await workspace.changes.run(workspace.screen.rest)
-
-
 def _target(workspace: Workspace, request: Request, _body: Any) -> Any:
     asked = request.query_params
     if not asked.keys() & {"light", "at"}:
         return _image(queries.target_jpeg(workspace.screen))
-    found = workspace.drag.target(*_move(workspace, asked), held="held" in asked)
+    found = workspace.drag.target(*change_of(workspace, asked), held="held" in asked)
     return Response(status_code=204) if found is None else _image(found)
 
 
@@ -474,7 +368,7 @@ def make_app(workspace: Workspace, access: Access) -> Starlette:
         Route(path, _handler(work, workspace), methods=["POST"], middleware=file if path == IMPORT else None)
         for path, work in _POST.items()
     ]
-    routes += [WebSocketRoute("/ws", workspace.socket), WebSocketRoute("/ws/moving", partial(_follow, workspace))]
+    routes += [WebSocketRoute("/ws", workspace.socket), WebSocketRoute("/ws/moving", partial(follow, workspace))]
     routes += [Mount("/static", StaticFiles(directory=STATIC))]
     return Starlette(
         routes=routes,

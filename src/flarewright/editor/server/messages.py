@@ -1,10 +1,17 @@
-"""Bodies of requests and messages of sockets: JSON objects of bounded depth with finite numbers."""
+"""Requests and messages of sockets: JSON objects of bounded depth with finite numbers, and why one failed."""
 
 from __future__ import annotations
 
 import json
 import math
+import traceback
 from typing import Any
+
+from ...errors import FlarewrightError
+from ..session.image_files import in_short
+from ..session.session import Session
+
+CROWDED = "the editor has too many unanswered requests; try again in a moment"
 
 # levels of lists and objects; the page sends five
 DEEPEST = 20
@@ -60,3 +67,13 @@ def brief(value: object) -> str:
     """Return a value in one line of at most `QUOTED` characters."""
     text = " ".join((value if isinstance(value, str) else repr(value)).split())
     return text if len(text) <= QUOTED else f"{text[: QUOTED - 1]}…"
+
+
+def why_failed(error: Exception, session: Session) -> str:
+    """Return one sentence on why a request failed."""
+    if isinstance(error, FlarewrightError):
+        return in_short(str(error), session.project, session.file)
+    if not isinstance(error, ValueError | LookupError | TypeError | ArithmeticError | AttributeError | OSError):
+        # a bug, which a page can cause but not mend
+        traceback.print_exception(error)
+    return f"the editor did not understand the page: {brief(str(error) or type(error).__name__)}"
