@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,12 +11,12 @@ import numpy as np
 from ...errors import LensError, ProjectError
 from ...kernels.design import ghosts as columns
 from ...model import Lens, Stop, Surface
-from ...optics.lens.paraxial import first_order
+from ...optics.lens.paraxial import FirstOrder, first_order
 from ...render.scene.resolve import complete_lens
 from ...typing import Floats
 from ..problem.ghosts import evaluate
 from ..problem.opening import opened_to
-from ..problem.prescription import structure_of, vector_of
+from ..problem.prescription import Structure, structure_of, vector_of
 
 # number of curvatures tried on either side, and of bisections
 TRIED = 4000
@@ -80,43 +81,58 @@ def resize_ghost(
     LensError
         When the lens forms no image any more, or a lens file cannot hold its f-number.
     """
-    structure = structure_of(lens)
+    structure, order, vector, entrance = _numbers_of(lens, f_number)
     if ghost not in structure.pairs:
         raise ProjectError(
             f"{lens.name} has no ghost {ghost[0]}-{ghost[1]} that reflects twice on one side of the stop; "
             "flarewright ghosts LENS --paths same-side lists them"
         )
-    order = first_order(lens, f_number)
-    vector = vector_of(lens, 2.0 * order.stop_semi_diameter, order.sensor_distance)
     row = ghost[0] if mirror == "first" else ghost[1]
     surface = lens.rows[row]
     assert isinstance(surface, Surface)
-    assert surface.semi_diameter is not None
-    entrance = 2.0 * (getattr(lens.rows[0], "semi_diameter", None) or order.entrance_pupil_diameter)
     g, at = structure.pairs.index(ghost), 1 + structure.rows + row
-
-    def radii(curvatures: Floats) -> Floats:
-        many = np.repeat(vector[None], len(curvatures), axis=0)
-        many[:, at] = curvatures
-        return np.asarray(np.abs(evaluate(structure, many, entrance)[:, g, columns.RADIUS]), dtype=np.float64)
-
-    before = evaluate(structure, vector[None], entrance)[0]
-    wanted = height * abs(before[g, columns.RADIUS])
-    curvature = _nearest_root(lambda c: radii(c) - wanted, surface.curvature, STEEPEST / surface.semi_diameter)
+    before = _ghosts(structure, vector, entrance)
+    curvature = _curvature(structure, vector, entrance, (g, at), height * abs(before[g, 1]), surface)
     if curvature is None:
         raise ProjectError(
             f"no curvature of row {row} makes ghost {ghost[0]}-{ghost[1]} {height:g} times as large; "
             "change the other mirror, or choose another size"
         )
     vector[at] = curvature
-    after = evaluate(structure, vector[None], entrance)[0]
     rows = list(lens.rows)
     rows[row] = surface.replace(curvature=curvature)
     bent = lens.replace(rows=tuple(rows), sensor_distance=order.sensor_distance)
     # the same stop diameter gives another f-number when the lens in front of the stop changes
     bent = complete_lens(opened_to(bent, float(vector[0])))
-    kept = [columns.PLACE, columns.RADIUS]
-    return Resized(bent, row, structure.pairs, before[:, kept], after[:, kept])
+    return Resized(bent, row, structure.pairs, before, _ghosts(structure, vector, entrance))
+
+
+def _numbers_of(lens: Lens, f_number: float | None) -> tuple[Structure, FirstOrder, Floats, float]:
+    """Return structure, first-order numbers, vector and diameter of the entrance of a lens."""
+    structure, order = structure_of(lens), first_order(lens, f_number)
+    entrance = 2.0 * (getattr(lens.rows[0], "semi_diameter", None) or order.entrance_pupil_diameter)
+    return structure, order, vector_of(lens, 2.0 * order.stop_semi_diameter, order.sensor_distance), entrance
+
+
+def _ghosts(structure: Structure, vector: Floats, entrance: float) -> Floats:
+    """Return place and radius of each ghost, shape (G, 2)."""
+    return np.asarray(evaluate(structure, vector[None], entrance)[0][:, [columns.PLACE, columns.RADIUS]])
+
+
+def _curvature(
+    structure: Structure, vector: Floats, entrance: float, where: tuple[int, int], wanted: float, surface: Surface
+) -> float | None:
+    """Return the curvature, `where[1]` of the vector, that gives ghost `where[0]` a radius; None if there is none."""
+    g, at = where
+    assert surface.semi_diameter is not None
+
+    def misses(curvatures: Floats) -> Floats:
+        many = np.repeat(vector[None], len(curvatures), axis=0)
+        many[:, at] = curvatures
+        radii = np.abs(evaluate(structure, many, entrance)[:, g, columns.RADIUS])
+        return np.asarray(radii - wanted, dtype=np.float64)
+
+    return _nearest_root(misses, surface.curvature, STEEPEST / surface.semi_diameter)
 
 
 def resize_all(
@@ -150,15 +166,13 @@ def resize_all(
     -----
     Van Acoleyen 2025, section 5.3.1.
     """
-    structure, order = structure_of(lens), first_order(lens, f_number)
-    vector = vector_of(lens, 2.0 * order.stop_semi_diameter, order.sensor_distance)
+    structure, _, vector, entrance = _numbers_of(lens, f_number)
     front = lens.rows[0]
     if by == "entrance" and not isinstance(front, Surface):
         raise ProjectError(
             f"the stop is the first row of {lens.name}, so nothing else bounds the entrance; resize by stop"
         )
-    entrance = 2.0 * (getattr(front, "semi_diameter", None) or order.entrance_pupil_diameter)
-    before = evaluate(structure, vector[None], entrance)[0]
+    before = _ghosts(structure, vector, entrance)
     if by == "stop":
         row, vector[0] = lens.stop_row, height * vector[0]
         changed = opened_to(lens, float(vector[0]))
@@ -173,14 +187,11 @@ def resize_all(
         changed = lens.replace(rows=(front.replace(semi_diameter=0.5 * entrance), *lens.rows[1:]))
         if f_number is not None:
             changed = changed.replace(f_number=f_number)
-    after = evaluate(structure, vector[None], entrance)[0]
-    kept = [columns.PLACE, columns.RADIUS]
-    return Resized(complete_lens(changed), row, structure.pairs, before[:, kept], after[:, kept])
+    return Resized(complete_lens(changed), row, structure.pairs, before, _ghosts(structure, vector, entrance))
 
 
-def _nearest_root(function: object, start: float, largest: float) -> float | None:
+def _nearest_root(function: Callable[[Floats], Floats], start: float, largest: float) -> float | None:
     """Return the root nearest to a start within +-largest."""
-    assert callable(function)
     # fine steps near the old curvature, coarse ones far from it
     steps = np.concatenate([[0.0], np.geomspace(1e-9, 2.0 * largest, TRIED)])
     best: float | None = None
