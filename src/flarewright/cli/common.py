@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..io.lens.formats.codev import FirstColumn
     from ..io.lens.own.record import LensRecord
     from ..optics.lens_import.patent_repair import Apertures
-    from ..typing import Progress
+    from ..typing import Progress, Report
 
 Word = TypeVar("Word", bound=str)
 
@@ -216,6 +216,19 @@ def console() -> Console:
     from rich.console import Console
 
     return Console(markup=False, highlight=False, width=None if sys.stdout.isatty() else 140)
+
+
+@contextmanager
+def status_line(words: str) -> Iterator[Report | None]:
+    """Show a changing line on a terminal; yield what changes it, None if not on a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.status import Status
+
+    with Status(words, console=Console(stderr=True)) as status:
+        yield status.update
 
 
 def focal_text(record: LensRecord) -> str:

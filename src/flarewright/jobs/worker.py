@@ -25,13 +25,8 @@ def serve() -> None:
     `function(context, item, threads)`, answered by ("done", result), ("refused", sentence, problems), ("memory",) or
     ("failed", traceback).
     """
-    # a terminal sends Ctrl-C to all its processes; the parent decides, and closes stdin
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        with suppress(AttributeError, ValueError, OSError):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
-    # libraries that print to stdout must not disturb the answers
     answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
+    as_child()
     items: SimpleQueue[Any] = SimpleQueue()
     Thread(target=_receive, args=(items,), daemon=True).start()
     where, context, threads = items.get()
@@ -42,6 +37,16 @@ def serve() -> None:
         return
     while True:
         _answer(answers, attempt(function, context, items.get(), threads))
+
+
+def as_child() -> None:
+    """Leave signals to the parent, and stdout to its answers."""
+    # a terminal sends Ctrl-C to all its processes; the parent decides, and closes stdin
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        with suppress(AttributeError, ValueError, OSError):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    # libraries that print to stdout must not disturb the answers
+    os.dup2(2, 1)
 
 
 def named(where: str) -> Callable[..., Any]:

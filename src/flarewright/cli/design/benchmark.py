@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from itertools import product
@@ -14,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ...errors import ProjectError
-from ..common import check_place, console, print_json, print_remark, stop_on_interrupt, write_text
+from ..common import check_place, console, print_json, print_remark, status_line, stop_on_interrupt, write_text
 from ..option_record import with_options
 from ..shared_options import Json
 from .checks import check_color_fitness, check_films, check_fitness, check_time
@@ -168,7 +166,7 @@ def _run_all(trial: Trial, options: BenchmarkOptions, limits: Limits, measure: A
     with (
         stop_on_interrupt() as asked,
         partial_work(place, inputs, "run", "runs") as steps,
-        _progress_display() as progress,
+        status_line("searching") as progress,
     ):
         run_one = partial(_run_one(trial), trial, measure=measure, threads=options.threads)
         done: list[Done] = []
@@ -274,16 +272,3 @@ def _print(trial: Trial, runs: Sequence[Run]) -> None:
 
 def _figure(key: str, value: float) -> str:
     return f"{value:.1f}" if key == "psnr_db" else (f"{value:.4f}" if key == "ssim" else f"{value:.3g}")
-
-
-@contextmanager
-def _progress_display() -> Iterator[Report | None]:
-    """Show the present run on a terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.status import Status
-
-    with Status("searching", console=Console(stderr=True)) as status:
-        yield status.update

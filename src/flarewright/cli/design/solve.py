@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ...errors import OutputError, ProjectError
-from ..common import print_json, print_remark, print_remarks, stop_on_interrupt
+from ..common import print_json, print_remark, print_remarks, status_line, stop_on_interrupt
 from ..shared_options import Json
 from .checks import check_fitness, check_time
 from .options import Cluster, Fitness, Lenses, Output, Processes, Restarts, Searches, Seed, Solver, Threads, Time
@@ -198,16 +197,11 @@ def _listed(breaks: Sequence[Breach], joint: str) -> str:
 @contextmanager
 def _progress_display(unit: str) -> Iterator[Callable[[PoolState], None] | None]:
     """Show the best result so far on a terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.status import Status
-
-    with Status("searching", console=Console(stderr=True)) as status:
+    with status_line("searching") as update:
 
         def show(state: PoolState) -> None:
             best = "-" if state.best is None else f"{state.best.cost:.3g}"
-            status.update(f"searching: {state.searches} {unit}, best cost {best}")
+            assert update is not None
+            update(f"searching: {state.searches} {unit}, best cost {best}")
 
-        yield show
+        yield None if update is None else show

@@ -6,7 +6,6 @@ import os
 import pickle
 import platform
 import shutil
-import signal
 import sys
 from contextlib import suppress
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from threading import Lock, Thread
 from typing import Any
 
 from ..._version import __version__
-from ..worker import WRITING, attempt, named
+from ..worker import WRITING, as_child, attempt, named
 from .quiet import quiet
 
 # packages whose version can change the bytes of a file
@@ -147,12 +146,7 @@ def work(context: Any, order: Order, item: Any) -> tuple[Any, ...]:
 
 def serve() -> None:
     """Be a worker of the scheduler that stdin names; end with the process that started this one."""
-    # a terminal sends Ctrl-C to all its processes; the caller decides, and closes stdin
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        with suppress(AttributeError, ValueError, OSError):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
-    # libraries that print to stdout must not disturb the caller's output
-    os.dup2(2, 1)
+    as_child()
     start: LocalWorker = pickle.load(sys.stdin.buffer)
     Thread(target=_end_with_caller, args=(start.scratch,), daemon=True).start()
     import asyncio
