@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeVar
+
 from pydantic import ValidationError
 
 from ...errors import ProjectError
 from ...model import Imperfection, Plate, SensorGrating
 from ..files.sentences import validation_sentences
+
+_Model = TypeVar("_Model", Imperfection, SensorGrating)
 
 
 def parse_plate(text: str, flag: str) -> Plate:
@@ -67,23 +72,12 @@ def parse_imperfection(text: str) -> Imperfection:
     ProjectError
         When the text has another form or a number is out of range.
     """
-    names = ("seed", "decentre_um", "tilt_arcmin", "figure_nm")
-    parts = [part.strip() for part in text.split(":")]
-    fields: dict[str, float] = {}
-    try:
-        if len(parts) > len(names):
-            raise ValueError
-        for name, part in zip(names, parts, strict=False):
-            fields[name] = int(part) if name == "seed" else float(part)
-    except ValueError:
-        raise ProjectError(
-            f"--imperfection {text!r} is no sample; write --imperfection 7 (a seed) or --imperfection 7:10:1:30 with "
-            "the tolerances in micrometres, minutes of arc and nanometres"
-        ) from None
-    try:
-        return Imperfection.model_validate(fields)
-    except ValidationError as error:
-        raise ProjectError(f"--imperfection {text!r}: {validation_sentences(error)[0]}") from None
+    return _parsed(
+        Imperfection, text, {"seed": int, "decentre_um": float, "tilt_arcmin": float, "figure_nm": float},
+        f"--imperfection {text!r}",
+        "is no sample; write --imperfection 7 (a seed) or --imperfection 7:10:1:30 with the tolerances in micrometres, "
+        "minutes of arc and nanometres",
+    )  # fmt: skip
 
 
 def parse_grating(text: str) -> SensorGrating:
@@ -102,18 +96,25 @@ def parse_grating(text: str) -> SensorGrating:
     ProjectError
         When the text has another form or a number is out of range.
     """
-    names = ("period_um", "fill", "orders")
+    return _parsed(
+        SensorGrating, text, {"period_um": float, "fill": float, "orders": int}, f"--sensor-grating {text!r}",
+        "is no grating; write --sensor-grating 8 (its period in micrometres) or --sensor-grating 8:0.7:3 with the "
+        "reflecting part of it and the number of orders",
+    )  # fmt: skip
+
+
+def _parsed(
+    kind: type[_Model], text: str, fields: dict[str, Callable[[str], float]], where: str, remedy: str
+) -> _Model:
+    """Return the record of numbers between colons, of which the last may be left out."""
     parts = [part.strip() for part in text.split(":")]
     try:
-        if len(parts) > len(names):
+        if len(parts) > len(fields):
             raise ValueError
-        found = {name: int(part) if name == "orders" else float(part) for name, part in zip(names, parts, strict=False)}
+        found = {name: read(part) for (name, read), part in zip(fields.items(), parts, strict=False)}
     except ValueError:
-        raise ProjectError(
-            f"--sensor-grating {text!r} is no grating; write --sensor-grating 8 (its period in micrometres) or "
-            "--sensor-grating 8:0.7:3 with the reflecting part of it and the number of orders"
-        ) from None
+        raise ProjectError(f"{where} {remedy}") from None
     try:
-        return SensorGrating.model_validate(found)
+        return kind.model_validate(found)
     except ValidationError as error:
-        raise ProjectError(f"--sensor-grating {text!r}: {validation_sentences(error)[0]}") from None
+        raise ProjectError(f"{where}: {validation_sentences(error)[0]}") from None

@@ -157,23 +157,19 @@ def _shape(where: str, kind: str, geometry: Mapping[str, Any], problems: list[st
             "conic_x": conic("conic_x"),
         }  # fmt: skip
     values: dict[str, Any] = {"curvature": curvature("radius"), "conic": conic("conic")}
-    if kind == "EvenAsphere":
-        terms = geometry.get("coefficients", [])
-        numbers = [json_number(value) for value in terms] if isinstance(terms, list) else [None]
-        if None in numbers or len(numbers) > MOST_TERMS + 1 or any(numbers[:1]):
-            problems.append(
-                f"{where}: its coefficients must be numbers of r^2, which must be 0, to r^{2 * MOST_TERMS + 2}"
-            )
-        values["asphere"] = tuple(value or 0.0 for value in numbers[1 : MOST_TERMS + 1])
-    elif kind == "OddAsphere":
-        terms = geometry.get("coefficients", [])
-        numbers = [json_number(value) for value in terms] if isinstance(terms, list) else [None]
-        if None in numbers or len(numbers) > 2 * MOST_TERMS + 2 or any(numbers[:2]):
-            problems.append(
-                f"{where}: its coefficients must be numbers of r and r^2, which must be 0, to r^{2 * MOST_TERMS + 2}"
-            )
-        values["odd_asphere"] = tuple(value or 0.0 for value in numbers[2 : 2 * MOST_TERMS + 2 : 2])
-        values["asphere"] = tuple(value or 0.0 for value in numbers[3 : 2 * MOST_TERMS + 2 : 2])
+    if kind not in ("EvenAsphere", "OddAsphere"):
+        return values
+    # the terms that must be 0, and the number of terms for each even one
+    first, step = ("r^2", 1) if kind == "EvenAsphere" else ("r and r^2", 2)
+    terms, last = geometry.get("coefficients", []), step * (MOST_TERMS + 1)
+    numbers = [json_number(value) for value in terms] if isinstance(terms, list) else [None]
+    if None in numbers or len(numbers) > last or any(numbers[:step]):
+        problems.append(
+            f"{where}: its coefficients must be numbers of {first}, which must be 0, to r^{2 * MOST_TERMS + 2}"
+        )
+    values["asphere"] = tuple(value or 0.0 for value in numbers[2 * step - 1 : last : step])
+    if step == 2:
+        values["odd_asphere"] = tuple(value or 0.0 for value in numbers[2:last:2])
     return values
 
 
