@@ -42,10 +42,6 @@ def pair(text: str, flag: str, example: str, separator: str = ",") -> tuple[floa
         For the error message.
     separator : str
 
-    Returns
-    -------
-    tuple of float
-
     Raises
     ------
     ProjectError

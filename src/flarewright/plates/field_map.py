@@ -85,14 +85,6 @@ class FieldMap:
 def field_map(settled: ResolvedProject) -> FieldMap:
     """Trace the direct image of a lens over its picture.
 
-    Parameters
-    ----------
-    settled : ResolvedProject
-
-    Returns
-    -------
-    FieldMap
-
     Raises
     ------
     ProjectError

@@ -31,12 +31,6 @@ class JoinedSourceSettings:
 def joined(tracks: Tracks, most_lights: int, settings: JoinedSourceSettings | None = None) -> tuple[Tracks, int, int]:
     """Join the faintest sources, so that no frame has more lights than allowed.
 
-    Parameters
-    ----------
-    tracks : Tracks
-    most_lights : int
-    settings : JoinedSourceSettings, optional
-
     Returns
     -------
     tracks : Tracks

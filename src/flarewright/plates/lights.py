@@ -97,10 +97,6 @@ def plate_tracks(
         Luminance from which a source counts as clipped.
     joined : int
         The last tracks, which are no single lamps.
-
-    Returns
-    -------
-    PlateTracks
     """
     bright = tracks.light @ LUMINANCE
     with np.errstate(invalid="ignore"):
@@ -132,11 +128,6 @@ def _mean(values: Floats, weights: Floats) -> Floats:
 
 def plate_factor(settled: ResolvedProject, directions: FieldMap) -> float:
     """Return the plate value of an irradiance on the sensor: radiance of the scene per irradiance of its image.
-
-    Parameters
-    ----------
-    settled : ResolvedProject
-    directions : FieldMap
 
     Returns
     -------

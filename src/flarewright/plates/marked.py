@@ -17,11 +17,6 @@ _LEAST, _APART = 4.0, 2.0
 def light_rows(plate: PlateTracks, frame: int) -> list[dict[str, float | int | str]]:
     """Return the lights of a frame in the plate's pixels and values, the brightest first.
 
-    Parameters
-    ----------
-    plate : PlateTracks
-    frame : int
-
     Returns
     -------
     list of dict

@@ -35,10 +35,6 @@ def contrast(i_max: float, i_min: float, i_flare: float) -> Contrast:
     i_flare : float
         Flare that is added to both, in the same unit.
 
-    Returns
-    -------
-    Contrast
-
     Notes
     -----
     Walch 2017, equations 9.1 to 9.3, after Keshmirian 2008; the ratio is the exact middle part of 9.3, not its

@@ -118,10 +118,6 @@ def sample_curves(
     spread : callable, optional
         Draws several constellations at a time, ahead of their turn; the curves do not depend on it.
 
-    Returns
-    -------
-    Curves
-
     Notes
     -----
     The interval with the largest error at its last halving is halved next. The `FIRST` initial constellations are

@@ -24,10 +24,6 @@ NO_FLARE = ("beauty", "starburst")
 def fingerprint_of(*inputs: str) -> str:
     """Return a hash of what a flare is drawn from, and of the program's version, whose pictures may differ.
 
-    Parameters
-    ----------
-    *inputs : str
-
     Returns
     -------
     str

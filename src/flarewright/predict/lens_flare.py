@@ -133,12 +133,6 @@ def largest_constellation(distance: float | None, efl: float) -> float:
 def square_flare(project: Project, quality: Quality, *, threads: int | None = None) -> tuple[Flare, Frame]:
     """Return the flare of a project's lens for a `FlareTable`, and the frame of its sensor.
 
-    Parameters
-    ----------
-    project : Project
-    quality : Quality
-    threads : int, optional
-
     Returns
     -------
     flare : Flare

@@ -31,10 +31,6 @@ _ANGLE = "constellation, degrees from the axis"
 def occurrence_page(found: Occurrence) -> str:
     """Return the report of a prediction.
 
-    Parameters
-    ----------
-    found : Occurrence
-
     Returns
     -------
     str

@@ -223,10 +223,6 @@ def plan_scene(
     spread : callable, optional
         Draws pictures by other processes; the plan does not depend on it.
 
-    Returns
-    -------
-    Plan
-
     Raises
     ------
     FlarewrightError
@@ -312,10 +308,6 @@ def _pair_remarks(camera: SceneCamera, light: SceneLight, flare: Flare, pair: Pa
 
 def ranking(plan: Plan) -> list[Ranked]:
     """Rank every light in every camera by its mean veil over time, worst first.
-
-    Parameters
-    ----------
-    plan : Plan
 
     Returns
     -------

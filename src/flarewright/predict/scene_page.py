@@ -34,14 +34,6 @@ def scene_page(
 ) -> str:
     """Return the report of a plan.
 
-    Parameters
-    ----------
-    plan : Plan
-    ranked : sequence of Ranked
-    shots : sequence of Shot
-    found : BestPosition or None
-    worst : sequence of Worst
-
     Returns
     -------
     str

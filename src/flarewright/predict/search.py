@@ -80,10 +80,6 @@ def best_position(
     spread : callable, optional
         Draws the pictures of several positions by other processes; the result does not depend on it.
 
-    Returns
-    -------
-    BestPosition
-
     Notes
     -----
     Points in a sunflower spiral over the disc, then over smaller discs around the best one. A moving camera is shifted

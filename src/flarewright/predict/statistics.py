@@ -91,10 +91,6 @@ def measure(light: Floats, share: Floats, area: float) -> Statistics:
         From `covered_area`.
     area : float
         Area of the frame, mm^2.
-
-    Returns
-    -------
-    Statistics
     """
     whole = float(share.sum())
     within = light[share >= 0.5]

@@ -64,10 +64,6 @@ class FlareTable:
     def views(self, roll_deg: float) -> list[tuple[float, float, float]]:
         """Return the pictures to combine for the flare at a roll.
 
-        Parameters
-        ----------
-        roll_deg : float
-
         Returns
         -------
         list of (drawn_roll_deg, turn_deg, weight)
@@ -87,10 +83,6 @@ class FlareTable:
 
     def nodes(self, constellation_deg: float, roll_deg: float) -> list[tuple[float, float, float, float]]:
         """Return the pictures to combine for linear interpolation at a constellation.
-
-        Parameters
-        ----------
-        constellation_deg, roll_deg : float
 
         Returns
         -------

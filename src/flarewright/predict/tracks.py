@@ -59,10 +59,6 @@ class CameraSighting:
 def moments(scene: Scene) -> tuple[Floats, tuple[datetime, ...] | None]:
     """Return the scene's times in seconds after its start, and as dates if it has a start date.
 
-    Parameters
-    ----------
-    scene : Scene
-
     Returns
     -------
     times_s : ndarray, shape (T,)
@@ -88,10 +84,6 @@ def camera_track(camera: SceneCamera, times_s: Floats, where: str) -> CameraTrac
     times_s : ndarray, shape (T,)
     where : str
         Name of the camera in messages.
-
-    Returns
-    -------
-    CameraTrack
 
     Raises
     ------

@@ -16,11 +16,6 @@ from ..typing import Floats
 def luminous_lines(spectrum: Spectrum, count: int) -> Lines:
     """Replace a spectrum by lines that give the same luminance through any factor smooth in wavelength.
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-    count : int
-
     Returns
     -------
     Lines

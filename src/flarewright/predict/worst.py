@@ -59,10 +59,6 @@ def render_worst(
         Pictures drawn before; new ones are added.
     spread : callable, optional
         Draws pictures by other processes.
-
-    Returns
-    -------
-    list of Worst
     """
     scene = plan.scene
     known: Memory = {} if memory is None else memory

@@ -34,10 +34,6 @@ def paraxial(
     sensor_distance, focus_distance : float, optional
         Override the values of the lens file, mm.
 
-    Returns
-    -------
-    FirstOrder
-
     Raises
     ------
     FlarewrightError
@@ -96,10 +92,6 @@ def ghosts(
         List to which assumptions and the rows of filter and cover glass are appended.
     threads : int, optional
         None: all cores. The results do not depend on it.
-
-    Returns
-    -------
-    GhostTable
 
     Raises
     ------

@@ -55,15 +55,6 @@ def cards() -> tuple[Card, ...]:
 def card_project(card: Card, size_px: tuple[int, int]) -> Project:
     """Return the project of a picture of the library.
 
-    Parameters
-    ----------
-    card : Card
-    size_px : tuple of int
-
-    Returns
-    -------
-    Project
-
     Raises
     ------
     ProjectError
@@ -86,11 +77,6 @@ def light_place(name: str) -> tuple[float, float]:
 
 def card_picture(card: Card, size_px: tuple[int, int]) -> NDArray[np.uint8]:
     """Render a picture of the library.
-
-    Parameters
-    ----------
-    card : Card
-    size_px : tuple of int
 
     Returns
     -------

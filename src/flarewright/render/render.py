@@ -248,10 +248,6 @@ def _matte(ranking: GhostRanking, passes: Sequence[Layer], project: Project, art
 def check_finite(layers: Sequence[Layer]) -> None:
     """Raise an error for layers with values that no picture file can hold.
 
-    Parameters
-    ----------
-    layers : sequence of Layer
-
     Raises
     ------
     ProjectError

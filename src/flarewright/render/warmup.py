@@ -63,10 +63,6 @@ def compile_for_analysis(lens: Lens, shown: Shown | None = None) -> None:
 def traits(project: Project) -> set[str]:
     """Return the features of a render that decide which kernels it calls (`kernels.jit.roots`).
 
-    Parameters
-    ----------
-    project : Project
-
     Raises
     ------
     FlarewrightError

@@ -116,12 +116,6 @@ def _spread(
 def draw_picture(context: Sequence[Recipe], item: _Picture, threads: int | None) -> Pixels:
     """Draw a picture in a process that works off a list.
 
-    Parameters
-    ----------
-    context : sequence of Recipe
-    item : _Picture
-    threads : int or None
-
     Returns
     -------
     ndarray, shape (H, W) or (H, W, 3)

@@ -110,10 +110,6 @@ def sweep_ghosts(
 def surface_gains(points: Sequence[SweepPoint]) -> tuple[SurfaceGain, ...]:
     """Rank surfaces by the ghost light that a coating without reflection there would remove.
 
-    Parameters
-    ----------
-    points : sequence of SweepPoint
-
     Returns
     -------
     tuple of SurfaceGain

@@ -29,10 +29,6 @@ def value_at(at_s: float, times_s: Sequence[float], values: Sequence[float], mot
         300), which has a continuous slope and never leaves the range of two neighbouring keys, so that an f-number or
         an intensity stays valid.
 
-    Returns
-    -------
-    float
-
     Notes
     -----
     `tests/workflow/test_keyframes.py` compares the slopes at the keys with the paper's harmonic mean.

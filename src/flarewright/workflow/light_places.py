@@ -62,10 +62,6 @@ class LightFinder:
         near_deg : tuple of float, optional
             Field angles of a place near by.
 
-        Returns
-        -------
-        tuple of float
-
         Raises
         ------
         ProjectError

@@ -65,10 +65,6 @@ def merge_photographs(
     report : callable
         Called with sentences on the run and on the cluster as they arise.
 
-    Returns
-    -------
-    MergedRun
-
     Raises
     ------
     FlarewrightError

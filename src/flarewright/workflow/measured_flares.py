@@ -178,15 +178,6 @@ def model_flare(
 ) -> Flare:
     """Return the counted light of a measured flare as a function.
 
-    Parameters
-    ----------
-    model : GhostModel
-    name : str
-    sensor_width_mm : float
-    unit_per_cd_m2 : float or None
-    width_px : int
-    counting : Counting
-
     Returns
     -------
     Flare

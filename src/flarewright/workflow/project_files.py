@@ -25,10 +25,6 @@ def open_project_files(file: Path, project: Project) -> ResolvedProject:
     project : Project
         Project with a lens.
 
-    Returns
-    -------
-    ResolvedProject
-
     Raises
     ------
     FlarewrightError

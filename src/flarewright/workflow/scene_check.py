@@ -54,10 +54,6 @@ def camera_errors(file: Path, scene: Scene, seen: Sequence[Sequence[CameraSighti
 def light_errors(scene: Scene) -> list[str]:
     """Return an error for each light without visible light.
 
-    Parameters
-    ----------
-    scene : Scene
-
     Returns
     -------
     list of str

@@ -130,10 +130,6 @@ def predict_scene(
     progress : callable
         Called with the name of a part of the work; returns the progress callback of that part.
 
-    Returns
-    -------
-    ScenePrediction
-
     Raises
     ------
     FlarewrightError

@@ -149,10 +149,6 @@ def draw_frame(plan: ShotPlan, frame: int, threads: int | None = None) -> FrameR
     threads : int, optional
         None: all cores. The bytes do not depend on it.
 
-    Returns
-    -------
-    FrameResult
-
     Raises
     ------
     FlarewrightError

@@ -67,10 +67,6 @@ def sun_place(when: datetime, site: Site, aim: CameraAim) -> SunPlace:
     site : Site
     aim : CameraAim
 
-    Returns
-    -------
-    SunPlace
-
     Raises
     ------
     FlarewrightError

@@ -130,10 +130,6 @@ def search(
         As for `search_in_folder`.
     resume_by : str, optional
         What the user runs to resume; None: `design resume`.
-
-    Returns
-    -------
-    FolderSearch
     """
     from ...workflow.searches.search_folder import search_in_folder
 

@@ -21,11 +21,6 @@ _PART = re.compile(r"^\s*(\d+(?:\.\d+)?)\s*(%|px)?\s*$")
 def framed(project: Project, flags: RenderOptions) -> tuple[Project, tuple[int, int], list[str]]:
     """Return a project with the sensor and the frame of the flags.
 
-    Parameters
-    ----------
-    project : Project
-    flags : RenderOptions
-
     Returns
     -------
     project : Project

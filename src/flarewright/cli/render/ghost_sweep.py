@@ -47,10 +47,6 @@ def sweep_axes(texts: Sequence[str]) -> SweepAxes:
     texts : sequence of str
         Each `AXIS=START:STOP:STEP` or `AXIS=VALUE,VALUE,...` with field, wavelength or fstop.
 
-    Returns
-    -------
-    SweepAxes
-
     Raises
     ------
     ProjectError

@@ -14,12 +14,7 @@ _SHOWN = 15
 
 
 def print_profile(profile: RenderProfile) -> None:
-    """Print a profile as a table to stderr.
-
-    Parameters
-    ----------
-    profile : RenderProfile
-    """
+    """Print a profile as a table to stderr."""
     from rich.console import Console
     from rich.table import Table
 

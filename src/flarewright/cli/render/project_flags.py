@@ -60,14 +60,6 @@ _SCATTER_USES: dict[str, tuple[str, ...]] = {"none": (), "chaumond": (), "abg": 
 def build_project(flags: RenderOptions) -> Project:
     """Return the project of the flags, based on that of the project file, of a resumed render or of a look.
 
-    Parameters
-    ----------
-    flags : RenderOptions
-
-    Returns
-    -------
-    Project
-
     Raises
     ------
     ProjectError

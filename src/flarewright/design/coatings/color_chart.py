@@ -41,10 +41,6 @@ def channel_chart(n_d: Floats, row: int, bounds: Bounds) -> Chart:
     n_d : ndarray, shape (K + 1,)
     row : int
     bounds : Bounds
-
-    Returns
-    -------
-    Chart
     """
     across, reflectance = channel_curves(n_d, row, bounds)
     series = [

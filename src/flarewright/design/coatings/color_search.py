@@ -90,10 +90,6 @@ def solve_colors(
     step : callable, optional
         Runs each batch of descents, or returns its result of an interrupted search.
 
-    Returns
-    -------
-    Coatings
-
     Raises
     ------
     ProjectError

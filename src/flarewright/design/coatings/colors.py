@@ -128,10 +128,6 @@ def mirrors_of(structure: Structure) -> Indices:
 def uses(structure: Structure) -> tuple[Floats, Floats]:
     """Return how often each ghost is reflected by each mirror and passes it.
 
-    Parameters
-    ----------
-    structure : Structure
-
     Returns
     -------
     reflections, passes : ndarray, shape (G, M)
@@ -189,11 +185,6 @@ def colors_of(problem: ColorProblem, values: Floats) -> Floats:
 
 def own_colors(lens: Lens, structure: Structure) -> Floats:
     """Return the colours of a lens' ghosts with its present coatings of any kind.
-
-    Parameters
-    ----------
-    lens : Lens
-    structure : Structure
 
     Returns
     -------
@@ -292,10 +283,6 @@ def coated(lens: Lens, coated_rows: Indices, kind: Kind, values: Floats) -> Lens
     kind : {"quarter-wave", "film"}
     values : ndarray, shape (M, P)
         As in `Coatings`.
-
-    Returns
-    -------
-    Lens
     """
     rows = list(lens.rows)
     for k, value in zip(coated_rows, values, strict=True):

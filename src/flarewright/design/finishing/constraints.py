@@ -44,10 +44,6 @@ def breaches(problem: Problem, structure: Structure, vector: Floats) -> tuple[Br
     problem : Problem
     structure : Structure
     vector : ndarray, shape (1 + 3 K,)
-
-    Returns
-    -------
-    tuple of Breach
     """
     missed, parts = _missed(problem, structure, vector, problem.objective.limits)
     found = [

@@ -32,10 +32,6 @@ def moderation(known: Variables, x: Floats) -> float:
     ----------
     known : Variables
     x : ndarray, shape (1 + 3 K,)
-
-    Returns
-    -------
-    float
     """
     return float((_off_middle(known, x[known.free]) ** 2).sum())
 

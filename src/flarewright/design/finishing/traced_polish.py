@@ -79,10 +79,6 @@ def traced_misfits(problem: Problem, structure: Structure, vector: Floats, ghost
     vector : ndarray, shape (1 + 3 K,)
     ghosts : tuple of (int, int)
         Mirrors of the ghost matched to each target (`objective.misfits`).
-
-    Returns
-    -------
-    TracedMisfits
     """
     aim = problem.objective
     first_order = evaluate(structure, vector[None], aim.entrance)[0]

@@ -12,16 +12,7 @@ from .objective import Objective
 
 
 def random_ghost_targets(count: int, seed: int) -> tuple[GhostTarget, ...]:
-    """Draw random ghosts along the line: places up to 18 mm from the middle, radii of 0.5 to 8 mm, mostly small.
-
-    Parameters
-    ----------
-    count, seed : int
-
-    Returns
-    -------
-    tuple of GhostTarget
-    """
+    """Draw random ghosts along the line: places up to 18 mm from the middle, radii of 0.5 to 8 mm, mostly small."""
     random = np.random.default_rng([seed, count])
     places = random.uniform(-18.0, 18.0, count)
     radii = np.exp(random.uniform(np.log(0.5), np.log(8.0), count)) * random.choice([-1.0, 1.0], count)

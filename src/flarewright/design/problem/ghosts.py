@@ -98,10 +98,6 @@ def differentiate(structure: Structure, vector: Floats, entrance: float) -> Deri
     vector : ndarray, shape (1 + 3 K,)
     entrance : float
         mm.
-
-    Returns
-    -------
-    Derivatives
     """
     count, size = len(structure.pairs), len(vector)
     values, jacobian = np.empty((count, kernel.COLUMNS)), np.empty((3, count, size))
@@ -127,10 +123,6 @@ def placed_ghosts(
         Diameter at the first vertex, mm; None: that of the first surface.
     sensor_distance : float, optional
         mm; None: from the lens file, else the paraxial focus.
-
-    Returns
-    -------
-    tuple of PlacedGhost
 
     Raises
     ------

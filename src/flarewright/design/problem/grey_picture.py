@@ -163,10 +163,6 @@ def ssim(target: Floats, found: Floats) -> float:
     Parameters
     ----------
     target, found : ndarray, shape (H, W)
-
-    Returns
-    -------
-    float
     """
     from scipy import ndimage
 

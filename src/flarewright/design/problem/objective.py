@@ -82,10 +82,6 @@ class Objective:
 def limits_of(bounds: Bounds) -> Floats:
     """Return the limits that are not bounds of a single variable.
 
-    Parameters
-    ----------
-    bounds : Bounds
-
     Returns
     -------
     ndarray, shape (4, 3)
@@ -240,10 +236,6 @@ def algorithm_1(sizes: Floats, places: Floats, found: Floats) -> float:
     places : ndarray, shape (N,)
     found : ndarray, shape (G, 2)
         Places and radii; G >= N.
-
-    Returns
-    -------
-    float
     """
     return float(sorted_misfit(np.ascontiguousarray(sizes), np.ascontiguousarray(places), np.ascontiguousarray(found)))
 

@@ -18,10 +18,6 @@ def opened_to(lens: Lens, stop_diameter: float) -> Lens:
     stop_diameter : float
         mm.
 
-    Returns
-    -------
-    Lens
-
     Raises
     ------
     LensError

@@ -71,14 +71,6 @@ class Structure:
 def structure_of(lens: Lens) -> Structure:
     """Return the structure of a lens.
 
-    Parameters
-    ----------
-    lens : Lens
-
-    Returns
-    -------
-    Structure
-
     Raises
     ------
     LensError
@@ -153,10 +145,6 @@ def _pairs(surfaces: int) -> int:
 def glass_patterns(surfaces: int) -> list[tuple[bool, ...]]:
     """List the glass patterns of a group of surfaces in air in which every surface touches glass.
 
-    Parameters
-    ----------
-    surfaces : int
-
     Returns
     -------
     list of tuple of bool
@@ -173,10 +161,6 @@ def glass_patterns(surfaces: int) -> list[tuple[bool, ...]]:
 
 def surfaces_for(ghosts: int) -> int:
     """Return the fewest surfaces that give that many ghosts, with the stop in the middle.
-
-    Parameters
-    ----------
-    ghosts : int
 
     Returns
     -------

@@ -54,10 +54,6 @@ class _Rows:
 def least_distances(problem: Problem) -> Floats:
     """Return for each target a lower bound of its distance to every ghost of every lens within the bounds.
 
-    Parameters
-    ----------
-    problem : Problem
-
     Returns
     -------
     ndarray, shape (N,)
@@ -101,10 +97,6 @@ class BrokenLimit:
 
 def broken_limits(problem: Problem) -> tuple[BrokenLimit, ...]:
     """Return the hard limits that no lens within the bounds can meet.
-
-    Parameters
-    ----------
-    problem : Problem
 
     Returns
     -------

@@ -94,10 +94,6 @@ def variables(
         Prescription whose `fixed_rows` stay unchanged.
     fixed_rows : tuple of int
 
-    Returns
-    -------
-    Variables
-
     Raises
     ------
     ProjectError

@@ -55,10 +55,6 @@ def explain_misfit(problem: Problem, found: Sequence[Outcome]) -> Explanation:
     problem : Problem
     found : sequence of Outcome
         Best first, at least one.
-
-    Returns
-    -------
-    Explanation
     """
     best = found[0]
     explained = _explained(problem, best)

@@ -70,10 +70,6 @@ def identify(
     ghosts : sequence of (int, int), optional
         Mirrors of the measured ghosts; None: all.
 
-    Returns
-    -------
-    Identification
-
     Notes
     -----
     Rank of the Jacobian by its singular values, with every column in the variable's own unit: fraction of a length, of

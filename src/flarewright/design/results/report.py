@@ -65,10 +65,6 @@ def search_summary(
         Targets proven impossible.
     conflict : tuple of Breach
         Violations of the hard limits by the nearest lens with any ghosts, if no lens keeps them.
-
-    Returns
-    -------
-    dict
     """
     return {
         "verdict": verdict(found[0] if found else None, proven, conflict),

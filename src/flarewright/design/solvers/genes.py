@@ -104,10 +104,6 @@ def genes_of(problem: Problem, measure: Measure = "ours") -> Genes:
         Several structures mean every pattern without a surface between air and air, at each of their stops.
     measure : {"ours", "algorithm1"}
 
-    Returns
-    -------
-    Genes
-
     Raises
     ------
     ProjectError

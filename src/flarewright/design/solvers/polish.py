@@ -97,17 +97,7 @@ def polish_within(
 def merge_pools(
     members: Sequence[LensCandidate], found: Sequence[LensCandidate], most: int
 ) -> tuple[LensCandidate, ...]:
-    """Merge minima into a pool, best first, without duplicates and without points that are no lens.
-
-    Parameters
-    ----------
-    members, found : sequence of LensCandidate
-    most : int
-
-    Returns
-    -------
-    tuple of LensCandidate
-    """
+    """Merge minima into a pool, best first, without duplicates and without points that are no lens."""
     out = list(members)
     for one in found:
         # costs equal to seven digits belong to the same minimum

@@ -122,10 +122,6 @@ def solve(
     state : PoolState, optional
         Search to resume; its seed replaces `seed`.
 
-    Returns
-    -------
-    PoolState
-
     Raises
     ------
     ProjectError
@@ -211,18 +207,7 @@ def batch_size(problem: Problem) -> int:
 
 
 def advance(run: Run, problem: Problem, seed: int) -> Run:
-    """Propose and polish one batch.
-
-    Parameters
-    ----------
-    run : Run
-    problem : Problem
-    seed : int
-
-    Returns
-    -------
-    Run
-    """
+    """Propose and polish one batch."""
     random = np.random.default_rng([seed, 3, run.number, run.batches])
     count = batch_size(problem)
     known = problem.variables(run.home)

@@ -65,14 +65,6 @@ def write_state(state: PoolState, path: Path, name: str | None = None) -> None:
 def read_state(path: Path) -> PoolState:
     """Read the file of `write_state`.
 
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    PoolState
-
     Raises
     ------
     ProjectError

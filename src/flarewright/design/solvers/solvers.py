@@ -59,10 +59,6 @@ def chosen(text: str) -> Choice:
     text : str
         Like "pso" or "pso:5x30", the thesis' notation of a population (figure 6.5).
 
-    Returns
-    -------
-    Choice
-
     Raises
     ------
     ProjectError
@@ -111,10 +107,6 @@ def solve_with(
         Of the built-in solver; the others use one.
     state : PoolState, optional
         Search for the built-in solver to resume; its seed replaces `seed`.
-
-    Returns
-    -------
-    Solution
 
     Raises
     ------

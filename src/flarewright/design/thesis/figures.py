@@ -85,10 +85,6 @@ def comparison(trial: Trial, runs: Sequence[Run]) -> list[tuple[str, ...]]:
     ----------
     trial : Trial
     runs : sequence of BenchmarkRun or ColorRun
-
-    Returns
-    -------
-    list of tuple of str
     """
     rows: list[tuple[str, ...]] = []
     for solver in solvers_of(runs):
@@ -144,10 +140,6 @@ def figure_data(trial: Trial, runs: Sequence[Run]) -> list[dict[str, Any]]:
     ----------
     trial : Trial
     runs : sequence of BenchmarkRun or ColorRun
-
-    Returns
-    -------
-    list of dict
     """
     about = figures_shown(trial, solvers_of(runs))
     lines = [

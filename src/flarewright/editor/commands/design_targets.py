@@ -30,10 +30,6 @@ def set_ghost_target(project: Project, ghost: str, values: dict[str, Any]) -> Pr
         "j-i", both rows on one side of the stop.
     values : dict
         Fields of `GhostTarget`.
-
-    Returns
-    -------
-    Project
     """
     j, i = (int(part) for part in ghost.split("-"))
     from ...render.scene.resolve import open_lens
@@ -72,10 +68,6 @@ def remove_ghost_target(project: Project, number: int, before: dict[str, Any] | 
     before : dict, optional
         Structure and fixed rows from before the first new ghost was added (`history.design_before_added`); they are
         restored when the last new ghost is removed.
-
-    Returns
-    -------
-    Project
     """
     design = _design_with(project, number)
     left = tuple(ghost_target for k, ghost_target in enumerate(design.ghost_targets) if k != number)
@@ -136,10 +128,6 @@ def _with(project: Project, design: Design, ghost_targets: tuple[GhostTarget, ..
 
 def target_project(project: Project) -> Project:
     """Return the project whose picture shows the targets: its ghosts are moved, resized and coloured by overrides.
-
-    Parameters
-    ----------
-    project : Project
 
     Returns
     -------

@@ -55,10 +55,6 @@ def set_cell(project: Project, row: int, column: str, text: str) -> Project:
     text : str
         As typed by the user: "flat", "52.3", "N-BK7", "air", "quarter-wave:550"; empty: unknown, or none.
 
-    Returns
-    -------
-    Project
-
     Raises
     ------
     FlarewrightError
@@ -454,10 +450,6 @@ def distortion_of(heights: Sequence[float] | Floats, ideals: Floats) -> tuple[fl
     ----------
     heights, ideals : array_like, shape (N,)
         At increasing field angles; shorter where there is no image any more.
-
-    Returns
-    -------
-    tuple of float
     """
     out: list[float] = []
     for height, nearer, ideal in zip(heights, (0.0, *heights), ideals, strict=False):

@@ -20,10 +20,6 @@ def set_plate(project: Project, values: dict[str, Any]) -> Project:
     values : dict
         Fields of `Backplate`; those of "search" are changed alone. Another image has its own lights: those of the
         project stay, but are no longer in its unit.
-
-    Returns
-    -------
-    Project
     """
     changes = {key: value for key, value in values.items() if key != SEARCH}
     if "lights_above" in changes:

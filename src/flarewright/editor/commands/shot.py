@@ -107,10 +107,6 @@ def set_holdout(project: Project, light: int | None, values: dict[str, Any] | No
         None: all of them.
     values : dict or None
         Fields of `Holdout`; an image replaces a depth plate, and vice versa.
-
-    Returns
-    -------
-    Project
     """
     old = project.holdout if light is None else light_of(project, light).holdout
     new: Holdout | None = None

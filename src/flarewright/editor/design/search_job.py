@@ -368,10 +368,6 @@ def described(lens: Lens) -> str:
 def changed(before: Project, after: Project) -> str:
     """Describe further changes that came with an accepted result, such as another f-number.
 
-    Parameters
-    ----------
-    before, after : Project
-
     Returns
     -------
     str
@@ -404,10 +400,6 @@ def coloured(problem: ColorProblem, values: Floats) -> str:
     problem : ColorProblem
     values : ndarray, shape (M, P)
         As in `Coatings`.
-
-    Returns
-    -------
-    str
     """
     off = perceived_differences(problem, colors_of(problem, values))
     names = [f"{j}-{i}" for j, i in problem.structure.pairs]

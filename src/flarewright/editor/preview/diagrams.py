@@ -35,14 +35,6 @@ from .display_image import png
 def mask_png(project: Project) -> bytes:
     """Return the mask of a project's iris as PNG, for the mask editor.
 
-    Parameters
-    ----------
-    project : Project
-
-    Returns
-    -------
-    bytes
-
     Raises
     ------
     ProjectError
@@ -114,10 +106,6 @@ def colour_map(project: Project, ghost: str) -> bytes:
 
 def ghost_places(project: Project) -> list[dict[str, object]]:
     """Return the first-order place of each ghost that design can move.
-
-    Parameters
-    ----------
-    project : Project
 
     Returns
     -------

@@ -38,10 +38,6 @@ def with_node(calibration: DraftCalibration | None, node: Node) -> DraftCalibrat
     calibration : DraftCalibration or None
         None: the first node.
     node : Node
-
-    Returns
-    -------
-    DraftCalibration
     """
     nodes = tuple(sorted([*(() if calibration is None else calibration.nodes), node], key=lambda one: one.angle_deg))
     names = tuple(sorted({name for one in nodes for name in one.parts}))
@@ -73,10 +69,6 @@ def measured(project: Project, angle_deg: float, check: Check) -> Node:
     angle_deg : float
     check : callable
         Exceptions that it raises end the work.
-
-    Returns
-    -------
-    Node
     """
     light = _brightest(project)
     x, y = (tan(radians(angle)) for angle in light.field_deg)
@@ -99,11 +91,6 @@ def measured(project: Project, angle_deg: float, check: Check) -> Node:
 
 def levels_at(match: Match, project: Project) -> Levels:
     """Return the gains of a draft's ghosts for the present places of the lights.
-
-    Parameters
-    ----------
-    match : Match
-    project : Project
 
     Returns
     -------

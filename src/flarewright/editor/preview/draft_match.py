@@ -96,10 +96,6 @@ def matched(draft: DrawnPicture | None, final: DrawnPicture, held: Match, levels
         Present match; returned if there is nothing to compare.
     levels : Levels, optional
         Levels of the draft; None: those of `held`.
-
-    Returns
-    -------
-    Match
     """
     if draft is None or draft.project != final.project:
         return held

@@ -74,10 +74,6 @@ def see(project: Project, grade: Grade, progress: Progress | None = None) -> Pic
     grade : {"draft", "final"}
     progress : callable, optional
         Exceptions that it raises end the work.
-
-    Returns
-    -------
-    PickableGhosts
     """
     stage = staged(project, grade, SMALL)
     art = Art(rules=tuple(rule for rule in project.art.rules if rule.enable is None))
@@ -119,10 +115,6 @@ def under(seen: PickableGhosts, u: float, v: float) -> tuple[str, ...]:
     seen : PickableGhosts
     u, v : float
         Fractions of the picture's width and height from the upper left corner.
-
-    Returns
-    -------
-    tuple of str
     """
     column, row = int(np.floor(u * seen.size_px[0])), int(np.floor(v * seen.size_px[1]))
     found: list[tuple[float, str]] = []

@@ -41,10 +41,6 @@ def packed_target(screen: Screen, project: Project, drawn: DrawnPicture) -> byte
         With its targets. New ghosts are uniform discs, a little brighter than their surroundings.
     drawn : DrawnPicture
         Picture of its `target_project`.
-
-    Returns
-    -------
-    bytes
     """
     discs = new_discs(project)
     if discs:
@@ -71,10 +67,6 @@ def picked(screen: Screen, u: float, v: float) -> tuple[str, ...]:
     screen : Screen
     u, v : float
         Fractions of the picture's width and height from the upper left corner.
-
-    Returns
-    -------
-    tuple of str
     """
     seen = screen.seen
     project = screen.session.project

@@ -86,10 +86,6 @@ def staged(
         As in `rest_size`, for a picture at rest.
     hasty : bool
         A traced preview may be coarser in steps, rims and rings, to save time; many area lights are points.
-
-    Returns
-    -------
-    Project
     """
     if isinstance(project.lens, str) and not is_measured(project):
         project = project.replace(lens=_loaded(project.lens, lens_path(project.lens).stat().st_mtime_ns))
@@ -167,10 +163,6 @@ def take(
     progress : callable, optional
         Exceptions that it raises end the render.
 
-    Returns
-    -------
-    DrawnPicture
-
     Raises
     ------
     FlarewrightError
@@ -205,16 +197,7 @@ def moving_stage(project: Project, scale: float, levels: Levels) -> Project:
 
 
 def common_gain(shown: Project, project: Project) -> float | None:
-    """Return the factor by which all lights of a project are brighter than in a shown one; None if more differs.
-
-    Parameters
-    ----------
-    shown, project : Project
-
-    Returns
-    -------
-    float or None
-    """
+    """Return the factor by which all lights of a project are brighter than in a shown one; None if more differs."""
     if len(shown.lights) != len(project.lights) or not shown.lights[0].intensity > 0.0:
         return None
     gain = project.lights[0].intensity / shown.lights[0].intensity

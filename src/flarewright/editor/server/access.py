@@ -91,10 +91,6 @@ def access_of(token: str, host: str, base_url: str | None = None) -> Access:
     base_url : str, optional
         Path of the page behind a proxy, "/user/me/proxy/8640/", or the whole address with it.
 
-    Returns
-    -------
-    Access
-
     Raises
     ------
     ProjectError

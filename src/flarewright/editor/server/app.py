@@ -350,17 +350,7 @@ async def _index(_request: Request) -> Response:
 
 
 def make_app(workspace: Workspace, access: Access) -> Starlette:
-    """Return the ASGI application of a workspace.
-
-    Parameters
-    ----------
-    workspace : Workspace
-    access : Access
-
-    Returns
-    -------
-    Starlette
-    """
+    """Return the ASGI application of a workspace."""
     file = [Middleware(RequestBodyLimitMiddleware, max_body_size=MOST_BYTES)]
     routes: list[Any] = [Route("/", _index)]
     routes += [Route(path, _handler(work, workspace), methods=["GET"]) for path, work in _GET.items()]

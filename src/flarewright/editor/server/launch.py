@@ -91,10 +91,6 @@ def _report_addresses(access: Access, port: int, report: Report) -> str:
 def hosts(host: str) -> tuple[str, ...]:
     """Return the addresses of a server that listens on `host`: for this computer first, then for others.
 
-    Parameters
-    ----------
-    host : str
-
     Returns
     -------
     tuple of str

@@ -27,11 +27,6 @@ from ..session.plate_finder import PlateFinder
 def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
     """Return the state of the page, without pictures and the table of ghosts.
 
-    Parameters
-    ----------
-    screen : Screen
-    solver : Solver
-
     Returns
     -------
     dict

@@ -25,14 +25,6 @@ def token_of(file: Path | None) -> str:
 
     The random one stays the same when the editor starts again, so that open pages reconnect.
 
-    Parameters
-    ----------
-    file : Path or None
-
-    Returns
-    -------
-    str
-
     Raises
     ------
     ProjectError

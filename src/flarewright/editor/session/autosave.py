@@ -58,11 +58,6 @@ def autosave_path(what: str | None, number: int = 1) -> Path:
 def write_autosave(path: Path, saved: Saved) -> None:
     """Write a session atomically, with a digest in the second line.
 
-    Parameters
-    ----------
-    path : Path
-    saved : Saved
-
     Raises
     ------
     OutputError

@@ -63,10 +63,6 @@ def claim(what: str | None) -> AutosaveWriter:
     ----------
     what : str or None
         As in `autosave_path`.
-
-    Returns
-    -------
-    AutosaveWriter
     """
     for number in range(1, MOST + 1):
         path = autosave_path(what, number)
@@ -82,12 +78,7 @@ def claim(what: str | None) -> AutosaveWriter:
 
 
 def claim_last() -> AutosaveWriter | None:
-    """Lock the most recent autosave of any project; None if there is none or another editor holds it.
-
-    Returns
-    -------
-    AutosaveWriter or None
-    """
+    """Lock the most recent autosave of any project; None if there is none or another editor holds it."""
     try:
         written = {path: path.stat().st_mtime_ns for path in state_folder().glob("*.autosave.json")}
         last = max(written, key=lambda path: written[path])

@@ -184,10 +184,6 @@ def imported(name: str, data: bytes, folder: Path, allowed: Callable[[Project], 
     allowed : callable
         As of `open_any`.
 
-    Returns
-    -------
-    Imported
-
     Raises
     ------
     FlarewrightError

@@ -29,14 +29,6 @@ WIDTH_PX = 1920
 def project_for_measured(path: str) -> Project:
     """Return a project for a measured flare: the frame of its captures, and a light within the captured range.
 
-    Parameters
-    ----------
-    path : str
-
-    Returns
-    -------
-    Project
-
     Raises
     ------
     FlarewrightError

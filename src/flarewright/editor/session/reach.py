@@ -93,10 +93,6 @@ def reach_of(roots: Iterable[Path], history: History) -> Reach:
     roots : iterable of Path
     history : History
         The folders of its project files are included, and the files that its projects read.
-
-    Returns
-    -------
-    Reach
     """
     beside = {Path(moment.file).parent for moment in history.moments if moment.file is not None}
     known = {path for moment in history.moments for path in files_of(moment.project)}

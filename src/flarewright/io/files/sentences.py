@@ -209,10 +209,6 @@ def summary(where: str, problems: list[str]) -> str:
         The file's name.
     problems : list of str
         At least one.
-
-    Returns
-    -------
-    str
     """
     if len(problems) == 1:
         return f"{where}: {problems[0]}"

@@ -46,10 +46,6 @@ def read_bytes(path: str | Path, what: str, largest: int = LARGEST) -> bytes:
     largest : int
         Bytes.
 
-    Returns
-    -------
-    bytes
-
     Raises
     ------
     FileError
@@ -103,10 +99,6 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
     path : str or Path
     what : str
         Expected kind of file, "a lens file", for the message.
-
-    Returns
-    -------
-    dict
 
     Raises
     ------

@@ -38,10 +38,6 @@ def exact_flags(av: Any) -> Any:
 def opened(path: str) -> Iterator[Any]:
     """Open a film; its errors become one sentence.
 
-    Parameters
-    ----------
-    path : str
-
     Yields
     ------
     av.container.InputContainer

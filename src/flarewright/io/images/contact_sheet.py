@@ -76,10 +76,6 @@ def sheet_page(title: str, figures: Sequence[Figure]) -> str:
 def sheet_picture(figures: Sequence[Figure]) -> NDArray[np.uint8]:
     """Return all figures as one picture, each above its title.
 
-    Parameters
-    ----------
-    figures : sequence of Figure
-
     Returns
     -------
     ndarray, shape (rows * (H + label), COLUMNS * W, 3), uint8

@@ -67,14 +67,6 @@ def _turned(k: int, bits: int) -> int:
 def identifier(name: str) -> int:
     """Return the identifier of an object: the bits of a float that is neither infinite, NaN, 0 nor denormal.
 
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    int
-
     Notes
     -----
     The specification's conversion `uint32_to_float32`: where all bits of the exponent are alike, its lowest is flipped.
@@ -107,16 +99,7 @@ def matte_layers(matte: GhostMatte) -> tuple[tuple[str, Pixels], ...]:
 
 
 def matte_attributes(names: Iterable[str]) -> dict[str, str]:
-    """Return the attributes of a file with a Cryptomatte of these objects.
-
-    Parameters
-    ----------
-    names : iterable of str
-
-    Returns
-    -------
-    dict
-    """
+    """Return the attributes of a file with a Cryptomatte of these objects."""
     key = f"cryptomatte/{murmur3_32(NAME.encode()):08x}"[: len("cryptomatte/") + 7]
     return {
         f"{key}/name": NAME,

@@ -275,14 +275,6 @@ def _write_parts(parts: list[Any], temporary: Path, path: str | PathLike[str]) -
 def read_exr(path: str | PathLike[str]) -> ExrContents:
     """Read a file that `write_exr` wrote.
 
-    Parameters
-    ----------
-    path : path
-
-    Returns
-    -------
-    ExrContents
-
     Raises
     ------
     OutputError
@@ -483,14 +475,6 @@ def _over_display(part: Any, pixels: Floats) -> Floats:
 def exr_size(path: str | PathLike[str]) -> tuple[int, int]:
     """Return the width and height of the first part's pixels without reading them.
 
-    Parameters
-    ----------
-    path : path
-
-    Returns
-    -------
-    tuple of int
-
     Raises
     ------
     OutputError
@@ -505,14 +489,6 @@ def exr_size(path: str | PathLike[str]) -> tuple[int, int]:
 
 def scale_in_exr(path: str | PathLike[str]) -> float:
     """Return the factor of the values in a file without reading its pixels; 1 in files of other programs.
-
-    Parameters
-    ----------
-    path : path
-
-    Returns
-    -------
-    float
 
     Raises
     ------

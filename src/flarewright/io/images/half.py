@@ -58,10 +58,6 @@ def half_scale(brightest: float = 1.0) -> float:
 def exr_scale(project: Project) -> float:
     """Return the factor of a project's irradiances in its EXR files.
 
-    Parameters
-    ----------
-    project : Project
-
     Returns
     -------
     float

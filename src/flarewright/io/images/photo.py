@@ -88,10 +88,6 @@ def open_photo(path: Path, white_level: float | None = None, block: int = 1) -> 
     block : int
         Average blocks of `block` x `block` pixels; incomplete blocks are dropped.
 
-    Returns
-    -------
-    Photo
-
     Raises
     ------
     FlarewrightError
@@ -117,10 +113,6 @@ def open_photo(path: Path, white_level: float | None = None, block: int = 1) -> 
 
 def photo_facts(path: Path) -> dict[str, float]:
     """Return exposure_s, iso, f_number and focal_mm of a photograph from its EXIF tags.
-
-    Parameters
-    ----------
-    path : Path
 
     Returns
     -------

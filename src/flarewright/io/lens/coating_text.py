@@ -116,10 +116,6 @@ def parse_coating_choice(text: str, *, folder: Path | None = None) -> CoatingCho
     folder : path, optional
         Base folder of relative paths; None: the working folder.
 
-    Returns
-    -------
-    CoatingChoice
-
     Raises
     ------
     FlarewrightError
@@ -151,10 +147,6 @@ def coating_choice(coating: str | PathLike[str] | Coating | CoatingChoice | None
     coating : None
         As in the lens file.
 
-    Returns
-    -------
-    CoatingChoice
-
     Raises
     ------
     FlarewrightError
@@ -175,10 +167,6 @@ def coating_from(value: object) -> Coating | None:
     ----------
     value : object
         A text (`UNCOATED` and the empty text give None) or a table with `kind` and the fields of the coating.
-
-    Returns
-    -------
-    Coating or None
 
     Raises
     ------
@@ -202,10 +190,6 @@ def format_coating(coating: Coating) -> str:
     Parameters
     ----------
     coating : Bare, QuarterWave, Film, Stack or Standard
-
-    Returns
-    -------
-    str
     """
     if isinstance(coating, Bare):
         return "none"
@@ -225,10 +209,6 @@ def format_coating(coating: Coating) -> str:
 
 def read_coating_file(path: str | Path) -> CoatingChoice:
     """Read a coating file: TOML with `coating = "..."`, or `rows = [...]` with one per row, or `in_turn = [...]`.
-
-    Parameters
-    ----------
-    path : str or Path
 
     Returns
     -------

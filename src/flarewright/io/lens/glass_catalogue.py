@@ -92,10 +92,6 @@ def by_name(name: str, n_d: float | None = None, *, suggest: bool = True) -> Cat
     suggest : bool
         Search near names for the message; takes longer than the rest of the function.
 
-    Returns
-    -------
-    CatalogueGlass
-
     Raises
     ------
     GlassError
@@ -175,10 +171,6 @@ def glasses_of(maker: str) -> tuple[CatalogueGlass, ...]:
     ----------
     maker : str
         One of `MAKERS`, in capitals.
-
-    Returns
-    -------
-    tuple of CatalogueGlass
     """
     return tuple(_glass(k) for k, row in enumerate(_catalogue().rows) if row[0] == maker)
 

@@ -18,11 +18,6 @@ from .shape_fields import POSITION_NUMBERS, shape_parts
 def write_lens(lens: Lens, path: str | Path) -> None:
     """Write a lens file that `read_lens` reads back as the same lens.
 
-    Parameters
-    ----------
-    lens : Lens
-    path : str or Path
-
     Raises
     ------
     OutputError
@@ -34,10 +29,6 @@ def write_lens(lens: Lens, path: str | Path) -> None:
 
 def format_lens(lens: Lens) -> str:
     """Return the text of a lens file.
-
-    Parameters
-    ----------
-    lens : Lens
 
     Returns
     -------

@@ -32,10 +32,6 @@ def lens_path(name_or_path: str | Path) -> Path:
         "heliar-tronnier" (case, spaces and underscores do not matter) or "my/lens.toml". A shipped lens comes before
         a lens of the user's library, and that before a file.
 
-    Returns
-    -------
-    Path
-
     Raises
     ------
     LensError

@@ -116,10 +116,6 @@ def attach_known(
 def complete_medium(lens: Lens) -> tuple[Lens, tuple[str, ...]]:
     """Assign a dispersion to every medium of a lens that has none.
 
-    Parameters
-    ----------
-    lens : Lens
-
     Returns
     -------
     lens : Lens

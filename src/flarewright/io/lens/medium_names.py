@@ -32,10 +32,6 @@ def named_medium(
     findings : list of (int, Finding)
     number : int
         Of the surface, for the findings.
-
-    Returns
-    -------
-    Medium or None
     """
     word = text.strip().strip("'\"")
     if word.upper() in _AIR:
@@ -69,10 +65,6 @@ def numbered_medium(
         None: not given. An Abbe number of 0 is unknown.
     place, problems, findings, number
         As in `named_medium`.
-
-    Returns
-    -------
-    Medium or None
     """
     if glass is None and n_d == 1.0:
         return None
@@ -106,10 +98,6 @@ def tabulated_medium(
         At least two, as many indices as wavelengths.
     place, problems, findings, number
         As in `named_medium`.
-
-    Returns
-    -------
-    Medium or None
     """
     n_d, n_f, n_c = (_index(wavelengths_nm, indices, line_nm) for line_nm in (587.5618, 486.1327, 656.2725))
     v_d = (n_d - 1.0) / (n_f - n_c) if n_f > n_c else None

@@ -24,10 +24,6 @@ def parse_plate(text: str, flag: str) -> Plate:
     flag : str
         Name of the flag, for the message.
 
-    Returns
-    -------
-    Plate
-
     Raises
     ------
     ProjectError
@@ -59,14 +55,6 @@ def parse_plate(text: str, flag: str) -> Plate:
 def parse_imperfection(text: str) -> Imperfection:
     """Return the imperfection of "SEED", "SEED:DECENTRE_UM:TILT_ARCMIN" or "SEED:DECENTRE_UM:TILT_ARCMIN:FIGURE_NM".
 
-    Parameters
-    ----------
-    text : str
-
-    Returns
-    -------
-    Imperfection
-
     Raises
     ------
     ProjectError
@@ -82,14 +70,6 @@ def parse_imperfection(text: str) -> Imperfection:
 
 def parse_grating(text: str) -> SensorGrating:
     """Return the grating of "PERIOD_UM", "PERIOD_UM:FILL" or "PERIOD_UM:FILL:ORDERS".
-
-    Parameters
-    ----------
-    text : str
-
-    Returns
-    -------
-    SensorGrating
 
     Raises
     ------

@@ -18,10 +18,6 @@ def read_scatter(table: object, problems: list[str]) -> Scatter | None:
         Parsed value; None when absent.
     problems : list of str
         Errors are appended.
-
-    Returns
-    -------
-    Scatter or None
     """
     if table is None:
         return None
@@ -48,10 +44,6 @@ def read_scatter(table: object, problems: list[str]) -> Scatter | None:
 
 def scatter_lines(scatter: Scatter | None) -> list[str]:
     """Return the `[scatter]` of a lens file as lines; empty for None.
-
-    Parameters
-    ----------
-    scatter : Scatter or None
 
     Returns
     -------

@@ -214,10 +214,6 @@ def shape_parts(row: Surface, number: Any, quoted: Any, radius: Any) -> list[str
         Format a number, a text.
     radius : callable
         Format a curvature as a radius.
-
-    Returns
-    -------
-    list of str
     """
     parts = []
     if row.curvature_x is not None:

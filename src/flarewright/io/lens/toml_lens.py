@@ -99,10 +99,6 @@ def read_lens(path: str | Path, first_column: codev.FirstColumn | None = None) -
 def read_lens_toml(path: str | Path) -> LensReading:
     """Read a lens file of our own format.
 
-    Parameters
-    ----------
-    path : str or Path
-
     Returns
     -------
     LensReading
@@ -130,10 +126,6 @@ def lens_from_table(table: dict[str, Any], where: str, *, folder: Path | None = 
     where : str
     folder : path, optional
         Base folder of relative image paths; None: the working folder.
-
-    Returns
-    -------
-    LensReading
 
     Raises
     ------

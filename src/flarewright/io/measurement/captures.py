@@ -58,10 +58,6 @@ def parse_rule(text: str) -> AngleRule:
     text : str
         Start and signed step, degrees.
 
-    Returns
-    -------
-    AngleRule
-
     Raises
     ------
     FlarewrightError
@@ -145,14 +141,6 @@ def captures_folder(path: Path) -> Path:
 
 def read_camera(path: Path) -> CameraNoise:
     """Read camera.json.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    CameraNoise
 
     Raises
     ------

@@ -48,14 +48,6 @@ def is_ghost_model_file(what: object) -> bool:
 def read_ghost_model(path: str | Path) -> GhostModel:
     """Read a measured flare.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    GhostModel
-
     Raises
     ------
     FlarewrightError
@@ -76,11 +68,6 @@ def read_corrections(path: str | Path) -> Corrections:
 
 def write_ghost_model(path: str | Path, model: GhostModel) -> None:
     """Write a measured flare as JSON, atomically.
-
-    Parameters
-    ----------
-    path : str or Path
-    model : GhostModel
 
     Raises
     ------

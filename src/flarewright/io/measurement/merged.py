@@ -60,10 +60,6 @@ def read_frame(folder: Path, info: FrameInfo) -> MergedFrame:
     info : FrameInfo
         One of `MergedRun.frames`.
 
-    Returns
-    -------
-    MergedFrame
-
     Raises
     ------
     FlarewrightError
@@ -88,11 +84,6 @@ def read_frame(folder: Path, info: FrameInfo) -> MergedFrame:
 def write_run(folder: Path, run: MergedRun) -> None:
     """Write the index of a run.
 
-    Parameters
-    ----------
-    folder : Path
-    run : MergedRun
-
     Raises
     ------
     OutputError
@@ -110,10 +101,6 @@ def read_run(folder: Path) -> MergedRun:
     ----------
     folder : Path
         Written by `flarewright measure merge`.
-
-    Returns
-    -------
-    MergedRun
 
     Raises
     ------

@@ -23,10 +23,6 @@ def read_file_of_kind(path: Path, kind: Kind) -> dict[str, Any]:
     path : Path
     kind : {"dataset", "project", "scene"}
 
-    Returns
-    -------
-    dict
-
     Raises
     ------
     ProjectError

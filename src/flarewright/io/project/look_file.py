@@ -40,10 +40,6 @@ def look_path(name_or_path: str | Path) -> Path:
     name_or_path : str or Path
         "warm-vintage" (case, spaces and underscores do not matter) or "my/look.toml".
 
-    Returns
-    -------
-    Path
-
     Raises
     ------
     ProjectError
@@ -70,10 +66,6 @@ def read_look(name_or_path: str | os.PathLike[str]) -> Look:
     ----------
     name_or_path : str or path
         As in `look_path`.
-
-    Returns
-    -------
-    Look
 
     Raises
     ------
@@ -119,10 +111,6 @@ def look_text(look: Look, folder: Path | None = None) -> str:
     look : Look
     folder : path, optional
         Folder of the TOML file: paths are written relative to it.
-
-    Returns
-    -------
-    str
     """
     whole = project_data(look.example, folder)
     out: dict[str, Any] = {"schema_version": _NEWEST, "name": look.name}

@@ -97,10 +97,6 @@ def project_from_data(data: dict[str, Any], *, folder: Path, where: str) -> Proj
     where : str
         The file's name for messages.
 
-    Returns
-    -------
-    Project
-
     Raises
     ------
     ProjectError
@@ -236,10 +232,6 @@ def validation_messages(error: ValidationError, data: Any, sections: Sections | 
         The validated data; names places as the file does.
     sections : dict of str to tuple of type, optional
         Record types of each section, for suggestions on unknown keys; None: those of a project.
-
-    Returns
-    -------
-    list of str
     """
     return validation_sentences(error, data, lambda keys: _suggestion(keys, sections))
 

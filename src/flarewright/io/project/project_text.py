@@ -157,10 +157,6 @@ def project_text(project: Project, *, folder: Path | None = None, comments: bool
         Folder of the TOML file: paths are written relative to it. None keeps paths unchanged.
     comments : bool
         Add explanations: a comment after each key, and unset keys as comments.
-
-    Returns
-    -------
-    str
     """
     data = project_data(project, folder)
     unset_keys = _unset_keys(project) if comments else {}
@@ -195,10 +191,6 @@ def project_data(project: Project, folder: Path | None = None) -> dict[str, Any]
     project : Project
     folder : path, optional
         As in `project_text`.
-
-    Returns
-    -------
-    dict
     """
     data = cast(dict[str, Any], _without_none(project.model_dump(mode="json")))
     if folder is not None:

@@ -35,10 +35,6 @@ def parse_spectrum(text: str, *, folder: Path | None = None) -> Spectrum:
     folder : path, optional
         Base folder of a relative CSV path; None: the working folder.
 
-    Returns
-    -------
-    Spectrum
-
     Raises
     ------
     ProjectError

@@ -62,10 +62,6 @@ def digest_in(path: Path) -> str:
 def read_planes(path: Path) -> tuple[int, Planes]:
     """Read what `write_planes` wrote.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     steps : int

@@ -27,11 +27,6 @@ SUFFIX = ".state.npz"
 def write_reference_state(path: Path, state: ReferenceState) -> None:
     """Write a state atomically.
 
-    Parameters
-    ----------
-    path : Path
-    state : ReferenceState
-
     Raises
     ------
     OutputError
@@ -61,10 +56,6 @@ def read_reference_state(path: str | Path) -> ReferenceState:
     Parameters
     ----------
     path : Path
-
-    Returns
-    -------
-    ReferenceState
 
     Raises
     ------

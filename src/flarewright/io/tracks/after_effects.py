@@ -32,10 +32,6 @@ def read_after_effects(text: str, file: str) -> TrackFile:
     file : str
         Its name, for messages.
 
-    Returns
-    -------
-    TrackFile
-
     Raises
     ------
     FileError

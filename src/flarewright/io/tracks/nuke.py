@@ -50,10 +50,6 @@ def read_nuke(text: str, file: str) -> TrackFile:
     file : str
         Its name, for messages.
 
-    Returns
-    -------
-    TrackFile
-
     Raises
     ------
     FileError
@@ -93,10 +89,6 @@ def read_columns(text: str, file: str, first_frame: float) -> TrackFile:
         Its name, for messages.
     first_frame : float
         Frame of the first line of two columns.
-
-    Returns
-    -------
-    TrackFile
 
     Raises
     ------

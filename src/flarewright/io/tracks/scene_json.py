@@ -80,10 +80,6 @@ def read_scene(text: str, file: str) -> TrackFile:
     file : str
         Its name, for messages.
 
-    Returns
-    -------
-    TrackFile
-
     Raises
     ------
     FileError

@@ -36,10 +36,6 @@ def read_syntheyes(text: str, file: str) -> TrackFile:
     file : str
         Its name, for messages.
 
-    Returns
-    -------
-    TrackFile
-
     Raises
     ------
     FileError

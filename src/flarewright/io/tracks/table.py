@@ -44,10 +44,6 @@ def read_table(text: str, file: str, origin: Origin = "top-left") -> TrackFile:
     origin : {"top-left", "bottom-left"}
         Corner from which x and y count.
 
-    Returns
-    -------
-    TrackFile
-
     Raises
     ------
     FileError

@@ -216,10 +216,6 @@ def curves_of(
     steps : Journal
     tell : callable
     settings : CompressionSettings
-
-    Returns
-    -------
-    list of Curves
     """
     measurements: list[list[_Measurement]] = [[] for _ in ghosts]
     times = frame_halvings(views[0].size_px[0], settings.tracking.frame)

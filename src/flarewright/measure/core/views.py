@@ -88,10 +88,6 @@ def views_of(frames: Sequence[MergedFrame], largest_deg: float | None = None) ->
     largest_deg : float, optional
         Constellation at which the normalized field is 1; None: the largest of the frames.
 
-    Returns
-    -------
-    tuple of View
-
     Raises
     ------
     FlarewrightError

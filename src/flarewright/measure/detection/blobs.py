@@ -43,10 +43,6 @@ def blobs(
         Channel of the variance.
     pool : executor, optional
     settings : BlobSettings
-
-    Returns
-    -------
-    list of RimCandidate
     """
     reach = 2.0 * views[0].size_px[0]
     places = np.arange(-reach, reach + 0.5 * settings.step_px, settings.step_px)

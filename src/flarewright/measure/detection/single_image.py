@@ -164,11 +164,6 @@ def _spot(name: str, view: View, place: float, radius: float, score: float, sett
 def spots_of_model(model: GhostModel, constellation_deg: float) -> tuple[Spot, ...]:
     """Return the ghosts of a model at one constellation as discs.
 
-    Parameters
-    ----------
-    model : GhostModel
-    constellation_deg : float
-
     Returns
     -------
     tuple of Spot

@@ -104,10 +104,6 @@ def without_removed(
     ghosts : sequence of AberrationGhost
     tell : callable
         Receives one line per unknown name.
-
-    Returns
-    -------
-    tuple of AberrationGhost
     """
     names = [ghost.name for ghost in ghosts]
     for name in corrections.remove:

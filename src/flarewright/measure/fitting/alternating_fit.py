@@ -196,11 +196,6 @@ def _with_best_rim(
 def kinds_of(shape: Shape, iris: Blades | None) -> list[Shape]:
     """Return a shape with each possible rim, its present rim first.
 
-    Parameters
-    ----------
-    shape : Shape
-    iris : Blades or None
-
     Returns
     -------
     list of Shape

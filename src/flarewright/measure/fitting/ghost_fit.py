@@ -223,10 +223,6 @@ def refine(
         Runs the patches; sums are taken in patch order.
     settings : FitSettings
 
-    Returns
-    -------
-    Fit
-
     Notes
     -----
     See `marquardt`; the Jacobian is the exact derivative of the drawn picture.

@@ -89,10 +89,6 @@ def solve_intensities(
         `settings`.
     pool : executor, optional
     settings : FitSettings
-
-    Returns
-    -------
-    list of DetectedGhost
     """
     if not ghosts:
         return []

@@ -55,10 +55,6 @@ def fit_shapes_jointly(
     pool : executor, optional
         Runs the views; sums are taken in view order.
     settings : FitSettings
-
-    Returns
-    -------
-    list of Shape
     """
     if not ghosts:
         return []

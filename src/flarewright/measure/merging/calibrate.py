@@ -89,10 +89,6 @@ def calibrate(
         As of `open_photo`.
     settings : MergeSettings
 
-    Returns
-    -------
-    CameraCalibration
-
     Raises
     ------
     FlarewrightError

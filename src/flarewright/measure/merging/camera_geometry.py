@@ -77,10 +77,6 @@ def believable(sightings: Sequence[LightSighting], settings: GeometrySettings = 
         Sightings in all frames of a run.
     settings : GeometrySettings
 
-    Returns
-    -------
-    list of bool
-
     Raises
     ------
     FlarewrightError
@@ -123,10 +119,6 @@ def solve_geometry(
     px_per_rad : float, optional
         Focal length in pixels to use when the light's path does not determine it.
     settings : GeometrySettings
-
-    Returns
-    -------
-    Geometry
 
     Raises
     ------

@@ -176,11 +176,6 @@ class Ratio:
 def exposure_ratios(exposures: Sequence[Exposure], *, settings: ExposureSettings = ExposureSettings()) -> list[Ratio]:
     """Compare each exposure with the next longer one where both are well lit.
 
-    Parameters
-    ----------
-    exposures : sequence of Exposure
-    settings : ExposureSettings
-
     Returns
     -------
     list of Ratio

@@ -64,10 +64,6 @@ def find_light(radiance: Band, variance: Band, settings: LightSettings = LightSe
     radiance, variance : ndarray, shape (height, width, 3)
         As in `MergedFrame`.
     settings : LightSettings
-
-    Returns
-    -------
-    LightSighting
     """
     clipped: Mask = np.asarray(np.isinf(variance).any(axis=2))
     light = radiance.mean(axis=2, dtype=np.float64)

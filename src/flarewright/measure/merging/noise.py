@@ -53,10 +53,6 @@ def noise_of(camera: CameraNoise, iso: float, step: float) -> Noise:
     step : float
         Step between two values of the file.
 
-    Returns
-    -------
-    Noise
-
     Raises
     ------
     FlarewrightError
@@ -125,10 +121,6 @@ def transfers(
     black_noise : float
         Variance of the black image that was subtracted from both, over that of a reading in the dark.
     settings : CalibrationSettings
-
-    Returns
-    -------
-    list of Transfer
 
     Notes
     -----

@@ -50,10 +50,6 @@ def reduced_frame(
     radiance, variance : ndarray, shape (height, width, 3)
     light_px : tuple of float
     settings : GeometrySettings
-
-    Returns
-    -------
-    Reduced
     """
     block = max(1, round(radiance.shape[1] / settings.axis_width_px))
 

@@ -44,10 +44,6 @@ def compress_ghosts(
         Called with the finished part (0 to 1) and a description.
     settings : MeasureSettings
 
-    Returns
-    -------
-    GhostModel
-
     Raises
     ------
     FlarewrightError

@@ -62,10 +62,6 @@ def fit_ghosts(
         As for `find_ghosts`.
     settings : MeasureSettings
 
-    Returns
-    -------
-    GhostModel
-
     Raises
     ------
     FlarewrightError

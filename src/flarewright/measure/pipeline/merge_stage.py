@@ -134,10 +134,6 @@ def merge_captures(
     spread : callable, optional
         Merges the frames elsewhere, such as on a cluster (`workflow.measure_merge`). None: on threads.
 
-    Returns
-    -------
-    MergedRun
-
     Raises
     ------
     FlarewrightError

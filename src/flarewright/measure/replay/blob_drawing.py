@@ -116,10 +116,6 @@ def blob_outline(
     constellation_deg : float
     largest_px : float
         Half the longer side of the largest box to accept.
-
-    Returns
-    -------
-    Outline or None
     """
     meshes, numbers, counts, _ = packed
     k = next((k for k, ghost in enumerate(meshes) if ghost.name == name), None)

@@ -99,10 +99,6 @@ def flare_of(project: Project) -> MeasuredFlare:
     project : Project
         Project for which `is_measured` is true.
 
-    Returns
-    -------
-    MeasuredFlare
-
     Raises
     ------
     FlarewrightError
@@ -127,10 +123,6 @@ def render_any(project: Project, *, progress: Progress | None = None) -> Renderi
     project : Project
     progress
         As for `render.render.render`.
-
-    Returns
-    -------
-    Rendering
 
     Raises
     ------

@@ -115,11 +115,6 @@ def _photographed_side(model: GhostModel, constellation_deg: float, roll_deg: fl
 def within_reach(model: GhostModel, constellation_deg: float, roll_deg: float) -> None:
     """Raise when a position of the light was not measured or is invalid.
 
-    Parameters
-    ----------
-    model : GhostModel
-    constellation_deg, roll_deg : float
-
     Raises
     ------
     FlarewrightError
@@ -207,12 +202,6 @@ def _in_rec709(layer: Layer, model: GhostModel) -> Layer:
 
 def draw(model: GhostModel, constellation_deg: float, roll_deg: float, size_px: tuple[int, int]) -> Floats:
     """Draw all ghosts of a model together.
-
-    Parameters
-    ----------
-    model : GhostModel
-    constellation_deg, roll_deg : float
-    size_px : tuple of int
 
     Returns
     -------

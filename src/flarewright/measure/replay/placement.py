@@ -60,10 +60,6 @@ def brightness_gain(reference: Reference, camera: ReplayCamera) -> float:
     camera : ReplayCamera
         New settings; None leaves a setting unchanged.
 
-    Returns
-    -------
-    float
-
     Raises
     ------
     FlarewrightError

@@ -45,16 +45,7 @@ class Paths:
 
 
 def paths_of(model: GhostModel) -> Paths:
-    """Compute the path of each ghost of a model from small drawings, positive constellations to the right of the axis.
-
-    Parameters
-    ----------
-    model : GhostModel
-
-    Returns
-    -------
-    Paths
-    """
+    """Compute the path of each ghost from small drawings, positive constellations to the right of the axis."""
     low, high = model.constellation_deg
     steps = np.linspace(low, high, _SAMPLES)
     size = _WIDTH_PX, max(1, round(_WIDTH_PX * model.size_px[1] / model.size_px[0]))

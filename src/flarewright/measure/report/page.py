@@ -103,11 +103,6 @@ def write_report(
 def strange(run: MergedRun, model: GhostModel) -> str | None:
     """Return the reason why a model does not belong to the frames of a run, or None.
 
-    Parameters
-    ----------
-    run : MergedRun
-    model : GhostModel
-
     Returns
     -------
     str or None

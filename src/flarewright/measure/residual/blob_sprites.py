@@ -98,10 +98,6 @@ def blobs_of(model: GhostModel, views: Sequence[View]) -> tuple[Blob, ...]:
     model : GhostModel
     views : sequence of View
         Sorted by constellation.
-
-    Returns
-    -------
-    tuple of Blob
     """
     drawn = pack(model)
     least = _BRIGHT * darkest_noise(views)

@@ -48,11 +48,6 @@ _WEIGHT_PER_STOP, _MOST_WEIGHT = 4.0, 127.0
 def with_moves(model: GhostModel, threads: int | None = None) -> GhostModel:
     """Return a model whose sprites that follow ghosts have moves.
 
-    Parameters
-    ----------
-    model : GhostModel
-    threads : int, optional
-
     Returns
     -------
     GhostModel

@@ -97,10 +97,6 @@ def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels], pool: ThreadPoo
     ----------
     views, pixels, pool
         As for `light_sprites`.
-
-    Returns
-    -------
-    Sprite
     """
     width, height = views[0].size_px
     grain = min(max(width / _MOST_CELLS, _CELL_PX), width / _LEAST_CELLS)

@@ -49,10 +49,6 @@ def follow(
         Resumes an interrupted run; the result does not depend on it.
     settings : TrackingSettings
 
-    Returns
-    -------
-    Tracks
-
     Notes
     -----
     A line through the last few frames that show a ghost predicts its pose in the next, as in Walch 2017, section 7.3.

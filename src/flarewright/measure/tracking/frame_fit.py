@@ -97,10 +97,6 @@ def measure_together(
         Count the expected model error as noise, and reduce the weight of outliers.
     settings : FrameFitSettings
 
-    Returns
-    -------
-    Measured
-
     Notes
     -----
     The brightness is linear and can be negative, as noise is. Weak priors about the predicted poses keep an invisible

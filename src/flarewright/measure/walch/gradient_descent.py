@@ -82,10 +82,6 @@ def descend_gradient(
     rounds : int
         Each round changes every number once, shape numbers before brightness.
 
-    Returns
-    -------
-    Descent
-
     Notes
     -----
     Section 7.2: central differences (equation 7.3), a separate step size for each number, each number updated at once

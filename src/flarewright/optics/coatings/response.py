@@ -71,10 +71,6 @@ def coating_response(
         Angles of incidence in the medium in front, 0 to 90.
     front : (float, array_like), optional
         Index at 587.56 nm and at `WAVELENGTHS_NM` of the medium in front: air, or the glass it is cemented to.
-
-    Returns
-    -------
-    CoatingResponse
     """
     indices, thicknesses_nm = film_stack(coating, front[0], n_d)
     wave, angles = WAVELENGTHS_NM, np.atleast_1d(np.asarray(angles_deg, dtype=np.float64))

@@ -140,10 +140,6 @@ def covers_all_lines(spectrum: Spectrum, wavelengths_nm: ArrayLike) -> bool:
     ----------
     spectrum : Spectrum
     wavelengths_nm : array_like, shape (N,)
-
-    Returns
-    -------
-    bool
     """
     if not isinstance(spectrum, Lines):
         return False
@@ -152,10 +148,6 @@ def covers_all_lines(spectrum: Spectrum, wavelengths_nm: ArrayLike) -> bool:
 
 def spectrum_xyz(spectrum: Spectrum) -> Floats:
     """Return the tristimulus values of a light, scaled to Y = 1.
-
-    Parameters
-    ----------
-    spectrum : Spectrum
 
     Returns
     -------
@@ -173,10 +165,6 @@ def spectrum_xyz(spectrum: Spectrum) -> Floats:
 
 def luminance_shares(spectrum: Spectrum) -> tuple[Floats, Floats]:
     """Return the distribution of a light's luminance over wavelength.
-
-    Parameters
-    ----------
-    spectrum : Spectrum
 
     Returns
     -------

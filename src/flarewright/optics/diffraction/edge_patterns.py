@@ -129,10 +129,6 @@ def edge_tables(corner: Corner, margin: float = REACH) -> EdgeTables:
     margin : float
         Distance from the border that the tables cover, in s; at least `REACH`.
 
-    Returns
-    -------
-    EdgeTables
-
     Notes
     -----
     The Fresnel integral as in `fresnel.fresnel_intensity`, with lambda L = 2 s^2, over squares so large that their
@@ -340,10 +336,6 @@ def gain(form: BladeForm, scale: float, tables: EdgeTables) -> float:
         s, mm.
     tables : EdgeTables
         From `averaged`.
-
-    Returns
-    -------
-    float
     """
     border, moment, corner = tables.excess
     half = form.half_length / scale * (border + form.curvature * scale * moment) + corner

@@ -12,10 +12,6 @@ def fast_size(least: int, *, even: bool = False) -> int:
         At least 1.
     even : bool
         Only even lengths.
-
-    Returns
-    -------
-    int
     """
     step = 2 if even else 1
     found = least + least % step

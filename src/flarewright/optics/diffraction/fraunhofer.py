@@ -158,10 +158,6 @@ def pupil_pattern(
     turn : float
         Rotates the whole pupil counter-clockwise, rad.
 
-    Returns
-    -------
-    Pattern
-
     Raises
     ------
     ValueError

@@ -180,10 +180,6 @@ def fresnel_grid(
     window : Box, optional
         Visible part of the stop for patterns of white light; default: the whole stop.
 
-    Returns
-    -------
-    FresnelGrid
-
     Notes
     -----
     The frequency f travels lambda L f sideways. The grid is so wide that its highest frequency, 1 / (2 step), does not

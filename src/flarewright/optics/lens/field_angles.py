@@ -95,10 +95,6 @@ def brightness_scale(ratios: Mapping[str, float]) -> float:
     ratios : mapping of str to float
         New setting over known setting, by name in `POWERS`; a missing one is 1.
 
-    Returns
-    -------
-    float
-
     Notes
     -----
     Walch 2017, equation 8.3: f_F^2 / f_R^2 * ISO_R / ISO_F * EXP_R / EXP_F * (l_R alpha_R) / (l_F alpha_F). The

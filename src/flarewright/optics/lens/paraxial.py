@@ -170,10 +170,6 @@ def first_order(
         Override those of the lens file, mm.
     wavelength_nm : float
 
-    Returns
-    -------
-    FirstOrder
-
     Raises
     ------
     LensError

@@ -141,10 +141,6 @@ def ghost_path(lens: Lens, j: int, i: int) -> LightPath:
     lens : Lens
     j, i : int
         Rows, counted from 0 at the front; neither is the stop.
-
-    Returns
-    -------
-    LightPath
     """
     return _path(lens, (j, i))
 
@@ -174,10 +170,6 @@ def four_path(lens: Lens, j: int, i: int, k: int, m: int) -> LightPath:
     lens : Lens
     j, i, k, m : int
         Rows other than the stop; j and k may be the sensor, row len(lens.rows).
-
-    Returns
-    -------
-    LightPath
     """
     return _path(lens, (j, i, k, m))
 

@@ -116,10 +116,6 @@ def sag(row: Surface | Stop, x: Floats, y: Floats) -> Floats:
 def shape_table(lens: Lens) -> Floats | None:
     """Return shape and pose of every row for `kernels.tracing.general_ray`.
 
-    Parameters
-    ----------
-    lens : Lens
-
     Returns
     -------
     ndarray, shape (K, P), or None

@@ -17,10 +17,6 @@ TERMS = tuple(range(5, 16))
 def glass_groups(lens: Lens) -> tuple[tuple[int, int], ...]:
     """Return the groups of rows that are one piece: single or cemented lenses.
 
-    Parameters
-    ----------
-    lens : Lens
-
     Returns
     -------
     tuple of (int, int)

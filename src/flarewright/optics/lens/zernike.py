@@ -20,10 +20,6 @@ def noll_order(index: int) -> tuple[int, int]:
     index : int
         From 1.
 
-    Returns
-    -------
-    tuple of int
-
     Notes
     -----
     Noll 1976, "Zernike polynomials and atmospheric turbulence": within a radial order the terms run by rising |m|, and

@@ -20,11 +20,6 @@ SLACK = 5e-3
 def at_position(lens: Lens, position: Position) -> Lens:
     """Return the lens at one of its positions.
 
-    Parameters
-    ----------
-    lens : Lens
-    position : Position
-
     Returns
     -------
     Lens

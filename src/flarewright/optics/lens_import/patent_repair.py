@@ -377,11 +377,6 @@ def _axial_beam(lens: Lens, order: FirstOrder) -> tuple[Floats, Floats]:
 def axial_opening(lens: Lens, order: FirstOrder) -> tuple[float, int]:
     """Return the relative opening of a lens for the axial beam.
 
-    Parameters
-    ----------
-    lens : Lens
-    order : FirstOrder
-
     Returns
     -------
     float

@@ -42,10 +42,6 @@ def half_field(lens: Lens) -> float:
 def with_semi_diameters(lens: Lens) -> Lens:
     """Fill in missing semi-diameters and mark them as estimated.
 
-    Parameters
-    ----------
-    lens : Lens
-
     Returns
     -------
     Lens

@@ -27,10 +27,6 @@ TRIAL = 8.0
 def lens_of_sequence(raw: RawSequence) -> LensReading:
     """Make a lens of a sequential file's contents.
 
-    Parameters
-    ----------
-    raw : RawSequence
-
     Returns
     -------
     LensReading

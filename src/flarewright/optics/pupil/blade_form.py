@@ -56,10 +56,6 @@ def blade_form(edges: Floats) -> BladeForm:
     ----------
     edges : ndarray, shape (B, 4)
         From `iris.blade_edges`.
-
-    Returns
-    -------
-    BladeForm
     """
     offset, curvature = float(edges[0, 2]), float(edges[0, 3])
     B = len(edges)

@@ -82,10 +82,6 @@ def generate_dirt(dirt: Dirt, radius_mm: float, turn: float = 0.0) -> Elements:
     turn : float
         Rotates all dirt counter-clockwise, rad.
 
-    Returns
-    -------
-    Elements
-
     Notes
     -----
     Every square millimetre (square centimetre for scratches) has a separate seed, so the dirt at a place does not
@@ -256,10 +252,6 @@ def scattered(elements: Elements, inside: Mask, inside_arcs: Mask, power: float)
     power : float
         Integral of the pupil's transmittance: the pattern is per unit of it.
 
-    Returns
-    -------
-    Veil
-
     Notes
     -----
     Babinet: far from the image of the opening, dirt scatters as openings of its shape would. A disc of radius a that
@@ -333,10 +325,6 @@ def spread_area(elements: Elements, inside: Mask, inside_arcs: Mask) -> float:
     ----------
     elements, inside, inside_arcs
         As in `scattered`.
-
-    Returns
-    -------
-    float
     """
     discs, arcs = elements.discs[inside], elements.arcs[inside_arcs]
     depth = 1.0 - np.sqrt(1.0 - discs[:, 3])

@@ -41,10 +41,6 @@ class Part:
 def light_outline(light: Light) -> Floats | None:
     """Return the outline of a light.
 
-    Parameters
-    ----------
-    light : Light
-
     Returns
     -------
     ndarray, shape (N, 2), or None

@@ -99,10 +99,6 @@ def pupil_amplitude(
     turn : float
         Rotates blades and images, rad.
 
-    Returns
-    -------
-    Pupil
-
     Raises
     ------
     ValueError

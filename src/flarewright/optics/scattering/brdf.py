@@ -112,10 +112,6 @@ def scatter_tables(lens: Lens, packed: PackedLens, scatter: Scatter) -> ScatterT
     scatter : Scatter
         Its model is not "none".
 
-    Returns
-    -------
-    ScatterTables
-
     Raises
     ------
     ProjectError

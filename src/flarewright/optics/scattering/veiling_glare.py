@@ -21,11 +21,6 @@ COARSE, FINE, DIRECT = 48, 64, 256
 def object_nearness(packed: PackedLens, lens: Lens) -> float:
     """Return the reciprocal object distance of the plane in focus, by matrices, at the first packed wavelength.
 
-    Parameters
-    ----------
-    packed : PackedLens
-    lens : Lens
-
     Returns
     -------
     float

@@ -19,10 +19,6 @@ def apply_gamut(gamut: Literal["keep", "compress"], layers: Sequence[Layer]) -> 
     gamut : {"keep", "compress"}
     layers : sequence of Layer
         Variances stay unchanged.
-
-    Returns
-    -------
-    list of Layer
     """
     if gamut == "keep":
         return list(layers)
@@ -31,10 +27,6 @@ def apply_gamut(gamut: Literal["keep", "compress"], layers: Sequence[Layer]) -> 
 
 def compressed(layer: Layer) -> Layer:
     """Return a layer without negative channels, for keying and blurring.
-
-    Parameters
-    ----------
-    layer : Layer
 
     Returns
     -------

@@ -242,10 +242,6 @@ class KeptSteps:
 def digest_of(*values: Any) -> str:
     """Return a digest of values: arrays, numbers, text, records, models and collections of them.
 
-    Parameters
-    ----------
-    *values
-
     Returns
     -------
     str

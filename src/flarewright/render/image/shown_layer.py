@@ -36,10 +36,6 @@ class ShownLayer(Layer):
         ----------
         exposure_stops : float, optional
             None: `render.image.display.auto_exposure` of this layer alone.
-
-        Returns
-        -------
-        bytes
         """
         from ...io.images.png import encode_png
         from .display import view

@@ -115,10 +115,6 @@ def chart(
     x_ticks : sequence of (float, str), optional
         Positions and labels; None: round numbers.
     decades : int
-
-    Returns
-    -------
-    Chart
     """
     width, height = size
     named = [one for one in series if one.label]

@@ -81,10 +81,6 @@ def coating_figure(
         Text of the headline.
     layout : Layout
         `SHEET` or `PANEL`.
-
-    Returns
-    -------
-    Chart
     """
     lines = _lines(_films(curves), (layout.right - layout.left) / (_LETTER * layout.words))
     at = _lowered(layout, (len(lines) - 1) * 1.2 * layout.words)

@@ -102,10 +102,6 @@ def ray_source(
         Whether its ghosts are added to the picture; False if they are traced from the camera instead.
     sampling : SpectralSampling, optional
         Of this shot, or of a shot that differs only in direction and intensity.
-
-    Returns
-    -------
-    RaySource
     """
     packed, tilt, axes = shot.packed, shot.incidence.tilt, shot.incidence.axes
     box = front_box(packed, tilt)

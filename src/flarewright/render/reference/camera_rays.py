@@ -64,10 +64,6 @@ def camera_source(
         Points of the picture per batch.
     light : int
         Index that makes the random numbers independent of those of other lights.
-
-    Returns
-    -------
-    CameraSource
     """
     shot = shots[0]
     border = np.concatenate([_bright(part) for part in shots])

@@ -94,10 +94,6 @@ class Ledger:
 def ledger_of(sums: Sums) -> Ledger:
     """Return the ledger of summed batches.
 
-    Parameters
-    ----------
-    sums : Sums
-
     Returns
     -------
     Ledger
@@ -129,10 +125,6 @@ def trace_ledger(
         One per shot; None: nothing scatters.
     threads : int, optional
         None: all cores. The result does not depend on it.
-
-    Returns
-    -------
-    Ledger
     """
     sources = [
         ray_source(shot, seed, side=SIDE, light=k, scatter=None if scatter is None else scatter[k])

@@ -137,10 +137,6 @@ def render_reference(
     progress : callable, optional
         Called with an estimate of the finished part, and the current error.
 
-    Returns
-    -------
-    ReferencePass
-
     Raises
     ------
     ProjectError

@@ -100,10 +100,6 @@ def find_four_reflections(
         Relative to the stop, as in `ghost_paths`.
     threads : int, optional
         None: all cores. The result does not depend on it.
-
-    Returns
-    -------
-    FourReflections
     """
     sources = [ray_source(shot, seed, side=SIDE, light=k, followed=FOLLOWED) for k, shot in enumerate(shots)]
     search, estimate = _Tally(), _Tally()
@@ -143,10 +139,6 @@ def find_four_reflections_unbounded(
         At one wavelength, not yet rotated to the light.
     query : GhostQuery
     threads : int, optional
-
-    Returns
-    -------
-    FourReflections
     """
     seen, semi = incidence(query.field_deg, query.distance, packed.first_order.entrance_pupil_z), packed.stop_semi
     blades = blade_edges(Iris(), semi)

@@ -58,10 +58,6 @@ def reference_rays(
         A batch has side x side points on the front, or in the picture.
     scatter : sequence of ScatterTables, optional
         One per shot; None: nothing scatters.
-
-    Returns
-    -------
-    ReferenceRays
     """
     sources: list[RaySource] = []
     cameras: list[CameraSource] = []

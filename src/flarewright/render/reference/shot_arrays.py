@@ -14,10 +14,6 @@ from ..scene.shot import Shot
 def shot_arrays(shot: Shot) -> tuple[LensArrays, StopArrays, PictureFrame]:
     """Return lens, stop and picture of a shot as kernel arguments; random rays of all lights run in the lens' frame.
 
-    Parameters
-    ----------
-    shot : Shot
-
     Returns
     -------
     lens : ConicLens or ShapedLens

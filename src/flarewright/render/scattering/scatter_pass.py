@@ -85,11 +85,6 @@ def chosen_scatter(settled: ResolvedProject) -> Scatter | None:
 def scatter_of(settled: ResolvedProject, shots: Sequence[Shot]) -> tuple[ScatterTables, ...] | None:
     """Tabulate the scatter of all surfaces, for every light.
 
-    Parameters
-    ----------
-    settled : ResolvedProject
-    shots : sequence of Shot
-
     Returns
     -------
     tuple of ScatterTables or None
@@ -114,10 +109,6 @@ def scatter_of(settled: ResolvedProject, shots: Sequence[Shot]) -> tuple[Scatter
 def check_scatter(settled: ResolvedProject) -> None:
     """Check the scatter settings without drawing.
 
-    Parameters
-    ----------
-    settled : ResolvedProject
-
     Raises
     ------
     ProjectError
@@ -136,10 +127,6 @@ def without_scattered(images: Sequence[DirectImage], tables: Sequence[ScatterTab
     ----------
     images, tables : sequence
         One per light.
-
-    Returns
-    -------
-    list of DirectImage
     """
     return [
         replace(
@@ -152,13 +139,7 @@ def without_scattered(images: Sequence[DirectImage], tables: Sequence[ScatterTab
 
 
 def scatter_facts(settled: ResolvedProject, tables: Sequence[ScatterTables]) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return facts about scatter for the summary, and remarks.
-
-    Parameters
-    ----------
-    settled : ResolvedProject
-    tables : sequence of ScatterTables
-    """
+    """Return facts about scatter for the summary, and remarks."""
     scatter = chosen_scatter(settled)
     assert scatter is not None, "there are tables only where something scatters"
     lost = 1.0 - float(min(table.kept.min() for table in tables))

@@ -68,10 +68,6 @@ def veiling_glare(project: Project, wavelength_nm: float, *, threads: int | None
     threads : int, optional
         None: all cores. The result does not depend on it.
 
-    Returns
-    -------
-    VeilingGlare
-
     Raises
     ------
     FlarewrightError

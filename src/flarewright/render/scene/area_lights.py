@@ -197,10 +197,6 @@ def halvings(border_px: Floats, size_px: float, most: int) -> int:
     size_px : float
         Radius of the ghost.
     most : int
-
-    Returns
-    -------
-    int
     """
     # a ragged shape has details finer than its width; for a disc both equal its radius
     fine = 2.0 * abs(content(border_px)) / max(rim(border_px), 1e-9)

@@ -80,10 +80,6 @@ def project_of(given: Project | Lens | str | PathLike[str], **settings: Unpack[S
     **settings : Settings
         Fields of the project; they override those of `given`.
 
-    Returns
-    -------
-    Project
-
     Raises
     ------
     ProjectError

@@ -48,11 +48,6 @@ class DirectImage:
 def direct_image(lens: Lens, shot: Shot) -> DirectImage:
     """Trace the direct path of a light.
 
-    Parameters
-    ----------
-    lens : Lens
-    shot : Shot
-
     Returns
     -------
     DirectImage
@@ -79,11 +74,6 @@ def direct_image(lens: Lens, shot: Shot) -> DirectImage:
 
 def direct_place(lens: Lens, shot: Shot) -> tuple[float, float] | None:
     """Return the position of a light's direct image: `DirectImage.position_mm`, without the flux per wavelength.
-
-    Parameters
-    ----------
-    lens : Lens
-    shot : Shot
 
     Returns
     -------
@@ -132,11 +122,6 @@ def _through_mask(shot: Shot, bundle: Bundle, data: Floats, sums: Floats) -> flo
 
 def defocus_mm(lens: Lens, shot: Shot) -> float:
     """Return the width of a point's defocused direct image on the sensor, from matrices.
-
-    Parameters
-    ----------
-    lens : Lens
-    shot : Shot
 
     Returns
     -------
@@ -221,12 +206,6 @@ def _trimmed(kernel: Floats) -> Floats:
 
 def traced_pupil(lens: Lens, shot: Shot, f_number: float) -> Floats | None:
     """Draw the pupil of the direct path as seen from the image: the cat's eye.
-
-    Parameters
-    ----------
-    lens : Lens
-    shot : Shot
-    f_number : float
 
     Returns
     -------

@@ -31,11 +31,6 @@ Plate = tuple[Holdout, Pixels]
 def read_plates(project: Project, light: Light) -> tuple[Plate, ...]:
     """Read the holdouts of a light.
 
-    Parameters
-    ----------
-    project : Project
-    light : Light
-
     Returns
     -------
     tuple of (Holdout, ndarray of shape (H, W))

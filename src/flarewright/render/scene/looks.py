@@ -146,10 +146,6 @@ def demonstration(look: Look, size_px: tuple[int, int] | None = None) -> Project
     look : Look
     size_px : tuple of int, optional
         Of the picture; None: the project's default.
-
-    Returns
-    -------
-    Project
     """
     example = Project(lens=look.example.lens, lights=look.example.lights, zoom=look.example.zoom)
     project, _ = as_photographed(with_look(example, look)[0], look_keys(look))

@@ -67,10 +67,6 @@ def make_opening(settled: ResolvedProject, mask: Floats | None) -> Opening:
     settled : ResolvedProject
     mask : ndarray, shape (A, B), or None
         Transmittance in [0, 1], row 0 up.
-
-    Returns
-    -------
-    Opening
     """
     semi = settled.order.stop_semi_diameter
     if mask is not None:

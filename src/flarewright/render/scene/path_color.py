@@ -259,17 +259,7 @@ def pixel_frame(shot: Shot, to_pixels: Floats) -> Floats:
 
 
 def direct_spectrum(shot: Shot, lens: Lens) -> PathSpectrum | None:
-    """Compute what coatings pass of the light on the axis that no surface reflects.
-
-    Parameters
-    ----------
-    shot : Shot
-    lens : Lens
-
-    Returns
-    -------
-    PathSpectrum or None
-    """
+    """Compute what coatings pass of the light on the axis that no surface reflects."""
     if shot.curves is None:
         return None
     path = direct_path(lens)

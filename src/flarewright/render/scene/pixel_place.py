@@ -57,10 +57,6 @@ def direct_images(settled: ResolvedProject, light: Light) -> DirectImages:
     light : Light
         Its distance and its spectrum count, which chooses the traced wavelengths. An area light counts as its centre.
 
-    Returns
-    -------
-    DirectImages
-
     Raises
     ------
     ProjectError

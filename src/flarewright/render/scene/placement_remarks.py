@@ -27,10 +27,6 @@ def outside_remarks(shots: Sequence[Shot], images: Sequence[DirectImage]) -> lis
         All parts of all lights.
     images : sequence of DirectImage
         One per shot.
-
-    Returns
-    -------
-    list of str
     """
     lights: dict[int, list[tuple[Shot, DirectImage]]] = {}
     for shot, image in zip(shots, images, strict=True):
@@ -77,10 +73,6 @@ def veil_remarks(ghosts: Layer) -> list[str]:
     ----------
     ghosts : Layer
         The layer of all ghosts.
-
-    Returns
-    -------
-    list of str
     """
     if ghosts.pixels.size == 0:
         return []

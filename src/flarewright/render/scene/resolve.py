@@ -78,10 +78,6 @@ def open_lens(
     first_column : {"radii", "curvatures"}, optional
         The first number of a surface in a `.seq` file that does not state it.
 
-    Returns
-    -------
-    OpenedLens
-
     Raises
     ------
     LensError
@@ -106,10 +102,6 @@ def load_lens(name_or_path: str | Path, *, remarks: list[str] | None = None, ape
     remarks : list of str, optional
         List to which the remarks are appended.
     apertures : {"auto", "diameters", "semi-diameters"}
-
-    Returns
-    -------
-    Lens
 
     Raises
     ------
@@ -163,14 +155,6 @@ def _opened(reading: LensReading, path: Path | None = None, checked: bool = Fals
 
 def complete_lens(lens: Lens) -> Lens:
     """Add what a prescription lacks: dispersions, heights of figure errors and semi-diameters.
-
-    Parameters
-    ----------
-    lens : Lens
-
-    Returns
-    -------
-    Lens
 
     Raises
     ------
@@ -300,10 +284,6 @@ def build(
     sensor_distance, focus_distance : float, optional
         Override the values of the lens file, mm, measured from the last and first vertex of the lens without plates.
 
-    Returns
-    -------
-    Built
-
     Raises
     ------
     FlarewrightError
@@ -399,14 +379,6 @@ class ResolvedProject:
 
 def resolve_project(project: Project) -> ResolvedProject:
     """Load and build the lens of a project, and compute its stop and focus.
-
-    Parameters
-    ----------
-    project : Project
-
-    Returns
-    -------
-    ResolvedProject
 
     Raises
     ------

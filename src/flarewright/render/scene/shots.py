@@ -34,10 +34,6 @@ def make_shots(settled: ResolvedProject, opening: Opening, *, sampled: bool = Fa
     opening : Opening
     sampled : bool
         Whether the wavelengths are spectral samples (`optics.colour.spectrum.sampled_wavelengths`), for random rays.
-
-    Returns
-    -------
-    tuple of Shot
     """
     project: Project = settled.project
     width, height = project.camera.size_px

@@ -147,10 +147,6 @@ def painter_of(
     wavelengths_nm : ndarray, shape (M,)
     weights : ndarray, shape (M, 3)
         Not all 0.
-
-    Returns
-    -------
-    Painter
     """
     strength = np.abs(weights).max(axis=1)
     # At the outer radius the shortest relevant wavelength reaches the end of the table; longer ones stay inside.

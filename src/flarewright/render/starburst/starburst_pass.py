@@ -55,14 +55,6 @@ class _Scene:
 def read_soil(dirt: Dirt) -> Soil | None:
     """Read the dirt on the pupil; None if it is clean.
 
-    Parameters
-    ----------
-    dirt : Dirt
-
-    Returns
-    -------
-    Soil or None
-
     Raises
     ------
     ProjectError

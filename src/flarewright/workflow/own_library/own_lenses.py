@@ -49,10 +49,6 @@ def own_library(progress: Progress | None = None) -> Library:
     ----------
     progress : callable, optional
         Reports the reading of lens files without a record, which takes longer than the rest.
-
-    Returns
-    -------
-    Library
     """
     index = read_index()
     remarks = [index.damaged] if index.damaged else []

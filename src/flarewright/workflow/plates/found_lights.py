@@ -102,10 +102,6 @@ def search_plate(plate: Backplate, progress: Progress | None = None) -> FoundLig
     progress : callable, optional
         Called with the finished part of the work and what is done; an exception that it raises ends the search.
 
-    Returns
-    -------
-    FoundLights
-
     Raises
     ------
     FlarewrightError
@@ -240,10 +236,6 @@ def kept_on_plate(before: Project, after: Project) -> Project:
     before, after : Project
         Before and after a change. Projects without a plate's lights, whose lens is the same, or makes no image, are
         returned as they are.
-
-    Returns
-    -------
-    Project
 
     Raises
     ------

@@ -35,10 +35,6 @@ def plate_frames(settings: PlateSettings, frames: Sequence[int] | None) -> tuple
     frames : sequence of int, optional
         Wanted ones; None: all that there are.
 
-    Returns
-    -------
-    tuple of int
-
     Raises
     ------
     ProjectError

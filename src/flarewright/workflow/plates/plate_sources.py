@@ -161,10 +161,6 @@ def plate_shot(
     executor : Executor, optional
         Searches instead of processes of this machine.
 
-    Returns
-    -------
-    PlateShot
-
     Raises
     ------
     FlarewrightError

@@ -42,10 +42,6 @@ def project_of_model(
     most : int
         Largest number of ghosts of a light, most visible first.
 
-    Returns
-    -------
-    Project
-
     Raises
     ------
     FlarewrightError
@@ -80,10 +76,6 @@ def project_of_picture(
     most : int
         Largest number of ghosts, most visible first.
 
-    Returns
-    -------
-    Project
-
     Raises
     ------
     FlarewrightError
@@ -114,14 +106,6 @@ def _striking(spots: tuple[Spot, ...], pixel: float, most: int) -> list[PhotoGho
 
 def busiest_constellation(model: GhostModel) -> float:
     """Return the constellation at which most ghosts are visible, degrees; the smallest of several.
-
-    Parameters
-    ----------
-    model : GhostModel
-
-    Returns
-    -------
-    float
 
     Raises
     ------

@@ -84,10 +84,6 @@ def search_in_folder(
     display : callable
         Called with the unit that the solver counts; during the search, its block's value gets the states.
 
-    Returns
-    -------
-    FolderSearch
-
     Raises
     ------
     ProjectError
@@ -151,16 +147,6 @@ def _stored(
 
 def search_to_resume(folder: Path, project: Project, seed: int) -> PoolState:
     """Return the search of a folder to resume, or a new one.
-
-    Parameters
-    ----------
-    folder : Path
-    project : Project
-    seed : int
-
-    Returns
-    -------
-    PoolState
 
     Raises
     ------

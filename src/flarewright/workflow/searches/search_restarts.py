@@ -311,10 +311,6 @@ def search_restart(
     asked : callable
         Whether to end early.
 
-    Returns
-    -------
-    PoolState
-
     Raises
     ------
     FlarewrightError

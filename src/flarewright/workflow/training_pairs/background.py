@@ -30,10 +30,6 @@ _OCTAVES = (3, 7, 17, 41, 97)
 def list_backgrounds(spec: DatasetSpec) -> tuple[str, ...]:
     """Return the pictures of the specification's folder, as sorted paths relative to it.
 
-    Parameters
-    ----------
-    spec : DatasetSpec
-
     Returns
     -------
     tuple of str

@@ -133,15 +133,6 @@ class Drawn:
 def draw_item(spec: DatasetSpec, index: int) -> Drawn:
     """Draw an item's values.
 
-    Parameters
-    ----------
-    spec : DatasetSpec
-    index : int
-
-    Returns
-    -------
-    Drawn
-
     Raises
     ------
     FlarewrightError
@@ -281,10 +272,6 @@ def _rounded(temperature_k: float, given: AnyDistribution) -> float:
 def check_lenses(spec: DatasetSpec) -> None:
     """Raise an error before the work for a lens that cannot be used with the specification.
 
-    Parameters
-    ----------
-    spec : DatasetSpec
-
     Raises
     ------
     FlarewrightError
@@ -331,10 +318,6 @@ def _check_coating(lens: Lens, text: str) -> None:
 @lru_cache(maxsize=16)
 def splits_of(spec: DatasetSpec) -> dict[str, str]:
     """Return the split of each lens.
-
-    Parameters
-    ----------
-    spec : DatasetSpec
 
     Returns
     -------

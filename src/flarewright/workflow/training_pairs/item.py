@@ -71,10 +71,6 @@ def write_item(plan: DatasetPlan, index: int, threads: int | None = None) -> Ite
     threads : int, optional
         None: all cores. The bytes do not depend on it.
 
-    Returns
-    -------
-    ItemResult
-
     Raises
     ------
     FlarewrightError
@@ -108,12 +104,6 @@ def fragment(plan: DatasetPlan, index: int) -> Path:
 
 def item_record(plan: DatasetPlan, index: int, split: str) -> bytes | None:
     """Return the record of a finished item, or None.
-
-    Parameters
-    ----------
-    plan : DatasetPlan
-    index : int
-    split : str
 
     Returns
     -------

@@ -71,10 +71,6 @@ def name_of(spec: DatasetSpec, split: str, index: int, part: str) -> str:
     index : int
     part : str
         A part, "project", "parameters", or a folder of Flare7K.
-
-    Returns
-    -------
-    str
     """
     suffix = {"project": "toml", "parameters": "json"}.get(part, "png" if _is_mask(part) else _SUFFIX[spec.format])
     key = key_of(index)

@@ -61,10 +61,6 @@ def draw_pictures(spec: DatasetSpec, index: int, backgrounds: Sequence[str], thr
     threads : int, optional
         None: all cores. The pixels do not depend on it.
 
-    Returns
-    -------
-    Pictures
-
     Raises
     ------
     FlarewrightError

@@ -76,10 +76,6 @@ def read_seq(path: str | Path, first_column: FirstColumn | None = None) -> RawSe
     first_column : {"radii", "curvatures"}, optional
         What the first number of a surface is if the file does not state it.
 
-    Returns
-    -------
-    RawSequence
-
     Raises
     ------
     LensError

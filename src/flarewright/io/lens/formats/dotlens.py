@@ -32,14 +32,6 @@ _TIGHTEST = 1e-3
 def read_dotlens(path: str | Path) -> RawLens:
     """Read a `.lens` file without repairs; each glass gets its dispersion.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    RawLens
-
     Raises
     ------
     LensError

@@ -38,14 +38,6 @@ _Findings = list[tuple[int, media.Finding]]
 def read_optiland(path: str | Path) -> RawSequence:
     """Read a lens that Optiland saved; each glass gets its dispersion.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    RawSequence
-
     Raises
     ------
     LensError

@@ -101,14 +101,6 @@ class _Reading:
 def read_len(path: str | Path) -> RawSequence:
     """Read a lens file of OSLO; each glass gets its dispersion.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    RawSequence
-
     Raises
     ------
     LensError

@@ -28,14 +28,6 @@ _TOP = ("name", "year", "patent_number", "notes", "focal_length", "fstop", "aper
 def read_realflare(path: str | Path) -> RawSequence:
     """Read a lens of RealFlare.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    RawSequence
-
     Raises
     ------
     LensError

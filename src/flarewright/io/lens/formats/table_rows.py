@@ -79,10 +79,6 @@ def sequence_of(path: str, head: TableHead, rows: Sequence[TableRow]) -> RawSequ
     rows : sequence of TableRow
         Front to back.
 
-    Returns
-    -------
-    RawSequence
-
     Raises
     ------
     LensError

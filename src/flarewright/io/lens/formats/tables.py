@@ -45,14 +45,6 @@ _FLAT_WORDS = ("", "flat", "plane", "plano", "inf", "infinity", "-inf")
 def read_csv_table(path: str | Path) -> RawSequence:
     """Read a CSV table of surfaces.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    RawSequence
-
     Raises
     ------
     LensError
@@ -85,10 +77,6 @@ def read_csv_table(path: str | Path) -> RawSequence:
 
 def read_dat(path: str | Path) -> RawSequence:
     """Read a lens file of pbrt.
-
-    Parameters
-    ----------
-    path : str or Path
 
     Returns
     -------

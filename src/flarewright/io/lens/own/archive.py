@@ -102,10 +102,6 @@ class Found:
 def lens_files(place: Path) -> Iterator[Found]:
     """List the lens files of a folder with its folders, a ZIP archive, or one file; they can be read in the block.
 
-    Parameters
-    ----------
-    place : Path
-
     Yields
     ------
     Found

@@ -60,10 +60,6 @@ def read_zmx(path: str | Path) -> RawSequence:
     path : str or Path
         UTF-16 or UTF-8, with or without a byte order mark, or the Windows code page of old versions.
 
-    Returns
-    -------
-    RawSequence
-
     Raises
     ------
     LensError
