@@ -358,6 +358,7 @@ COMMAND_LINES = {
         [*H, *GOOD, "--ideal", "--sensor", "1e6x1e6", "--size", "64x36", "--quality", "draft"],
         "pixels of 2.78e+04 mm are too coarse for the starburst, whose core has 0.084 mm; give a smaller --sensor"),
     "unknown layers": ([*H, *GOOD, "--layers", "all"], "--layers"),
+    "unknown compression": ([*H, *GOOD, "--compression", "piz"], "--compression"),
     "brightest zero": ([*H, *GOOD, "--brightest", "0"], "--brightest"),
     "unknown colorspace": ([*H, *GOOD, "--colorspace", "nonsense"], "rec709"),
     "unknown view": ([*H, *GOOD, "--view", "log"], "--view 'log'"),

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 import pytest
 from typer.main import get_command
 
 from flarewright.cli.app import app, run
+from flarewright.cli.render.options.record import RenderOptions
+from flarewright.cli.render.project_flags import _OPTION_OF, _SECTIONS
+from flarewright.model import Light, Project
 
 
 def options(command: Any, name: str = "flarewright") -> dict[str, Any]:
@@ -49,3 +53,11 @@ def test_a_value_of_another_kind_is_reported_in_words(capsys, words, said):
     assert said in err
     for python in ("Input should", "valid integer", "valid number", "float", "parse string"):
         assert python not in err
+
+
+def test_each_option_of_a_project_sets_a_key_that_exists():
+    project = Project(lens="heliar-tronnier", lights=(Light(field_deg=(0.0, 0.0)),))
+    for key, option in _OPTION_OF.items():
+        section, _, name = key.partition(".")
+        assert option in {one.name for one in fields(RenderOptions)}
+        assert section not in _SECTIONS or hasattr(getattr(project, section), name), key
