@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
 
-def lazy_names(
-    package: str, homes: Mapping[str, Sequence[str]]
-) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
-    """Make a package's `__all__`, `__getattr__` and `__dir__`.
+def lazy_names(package: str) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
+    """Make a package's `__all__`, `__getattr__` and `__dir__` from its stub `__init__.pyi`, which type checkers read.
 
     Parameters
     ----------
     package : str
-        Its `__name__`.
-    homes : mapping of str to sequence of str
-        Which names each module has, by its path from the package (".pipeline.find_stage"); "" for sub-packages.
+        Its `__name__`. A line `from .errors import LensError as LensError` of the stub is a public name.
 
     Returns
     -------
@@ -29,18 +25,24 @@ def lazy_names(
 
     Examples
     --------
-    >>> names, get, _ = lazy_names("flarewright", {".errors": ("FlarewrightError",)})
-    >>> names, get("FlarewrightError").__name__
-    (['FlarewrightError'], 'FlarewrightError')
+    >>> import flarewright
+    >>> names, get, _ = lazy_names("flarewright")
+    >>> "LensError" in names, get("LensError").__name__
+    (True, 'LensError')
     """
-    home = {name: module for module, names in homes.items() for name in names}
+    spec: Any = sys.modules[package].__spec__
+    lines = (line.split() for line in spec.loader.get_data(f"{spec.origin}i").decode().splitlines())
+    home = {words[-1]: words[1] for words in lines if words[:1] == ["from"]}
     known = sorted(home)
 
     def get(name: str) -> Any:
         if name not in home:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        module = import_module(home[name] or f".{name}", package)
-        value = getattr(module, name) if home[name] else module
+        if home[name] == f".{name}.{name}":
+            # `render` is a package that may be called: the function could not live beside it
+            value: Any = import_module(f".{name}", package)
+        else:
+            value = getattr(import_module(home[name], package), name)
         setattr(sys.modules[package], name, value)
         return value
 

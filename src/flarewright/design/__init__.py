@@ -14,27 +14,6 @@ Main names: `Problem`, `problem_of`, `solve`, `State`, `Outcome`, `outcomes`, `i
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..lazy import lazy_names
 
-if TYPE_CHECKING:
-    from .finishing.candidate import Outcome as Outcome
-    from .finishing.candidate import outcomes as outcomes
-    from .problem.problem import Problem as Problem
-    from .problem.target import problem_of as problem_of
-    from .results.identify import Identification as Identification
-    from .results.identify import identify as identify
-    from .solvers.pool_search import PoolState as PoolState
-    from .solvers.pool_search import solve as solve
-
-__all__, __getattr__, __dir__ = lazy_names(
-    __name__,
-    {
-        ".problem.problem": ("Problem",),
-        ".problem.target": ("problem_of",),
-        ".solvers.pool_search": ("PoolState", "solve"),
-        ".finishing.candidate": ("Outcome", "outcomes"),
-        ".results.identify": ("Identification", "identify"),
-    },
-)
+__all__, __getattr__, __dir__ = lazy_names(__name__)

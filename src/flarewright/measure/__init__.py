@@ -20,32 +20,6 @@ by frame, compacts the model and replays it. The functions of `pipeline` run the
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..lazy import lazy_names
 
-if TYPE_CHECKING:
-    from .merging.settings import MergeSettings as MergeSettings
-    from .pipeline.compress_stage import compress_ghosts as compress_ghosts
-    from .pipeline.find_stage import find_ghosts as find_ghosts
-    from .pipeline.fit_stage import fit_ghosts as fit_ghosts
-    from .pipeline.merge_stage import merge_captures as merge_captures
-    from .pipeline.settings import MeasureSettings as MeasureSettings
-    from .pipeline.track_stage import track_ghosts as track_ghosts
-    from .replay.measured_project import render_measured as render_measured
-    from .replay.model_image import replay_model as replay_model
-
-__all__, __getattr__, __dir__ = lazy_names(
-    __name__,
-    {
-        ".merging.settings": ("MergeSettings",),
-        ".pipeline.settings": ("MeasureSettings",),
-        ".pipeline.merge_stage": ("merge_captures",),
-        ".pipeline.find_stage": ("find_ghosts",),
-        ".pipeline.fit_stage": ("fit_ghosts",),
-        ".pipeline.track_stage": ("track_ghosts",),
-        ".pipeline.compress_stage": ("compress_ghosts",),
-        ".replay.model_image": ("replay_model",),
-        ".replay.measured_project": ("render_measured",),
-    },
-)
+__all__, __getattr__, __dir__ = lazy_names(__name__)

@@ -23,35 +23,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..lazy import lazy_names
 
-if TYPE_CHECKING:
-    from .curves import Curves as Curves
-    from .curves import sample_curves as sample_curves
-    from .flare import Flare as Flare
-    from .flare import Frame as Frame
-    from .lens_flare import lens_flare as lens_flare
-    from .lens_flare import square_flare as square_flare
-    from .occurrence import Flares as Flares
-    from .occurrence import Occurrence as Occurrence
-    from .occurrence import Setting as Setting
-    from .occurrence import Wanted as Wanted
-    from .occurrence import predict_occurrence as predict_occurrence
-    from .plan import Plan as Plan
-    from .plan import plan_scene as plan_scene
-    from .plan import ranking as ranking
-    from .switching import choose_cameras as choose_cameras
-
-__all__, __getattr__, __dir__ = lazy_names(
-    __name__,
-    {
-        ".curves": ("Curves", "sample_curves"),
-        ".flare": ("Flare", "Frame"),
-        ".lens_flare": ("lens_flare", "square_flare"),
-        ".occurrence": ("Flares", "Occurrence", "Setting", "Wanted", "predict_occurrence"),
-        ".plan": ("Plan", "plan_scene", "ranking"),
-        ".switching": ("choose_cameras",),
-    },
-)
+__all__, __getattr__, __dir__ = lazy_names(__name__)

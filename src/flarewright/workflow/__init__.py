@@ -36,44 +36,6 @@ The command line and other front ends call these functions; nothing here prints.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..lazy import lazy_names
 
-if TYPE_CHECKING:
-    from .flare_curves import flare_curves as flare_curves
-    from .lens_flares import camera_project as camera_project
-    from .lens_flares import lens_flares as lens_flares
-    from .lens_flares import scene_flare as scene_flare
-    from .light_places import lights_at_pixels as lights_at_pixels
-    from .light_places import with_tracks as with_tracks
-    from .measure_merge import merge_photographs as merge_photographs
-    from .measure_provenance import STAGES as STAGES
-    from .measure_run import StageResult as StageResult
-    from .measure_run import run_stages as run_stages
-    from .project_files import open_project_files as open_project_files
-    from .scene_prediction import NearbySearch as NearbySearch
-    from .scene_prediction import ScenePrediction as ScenePrediction
-    from .scene_prediction import predict_scene as predict_scene
-    from .searches.lens_search import LensSearch as LensSearch
-    from .searches.lens_search import search_lenses as search_lenses
-    from .searches.search_folder import SearchLimits as SearchLimits
-    from .searches.search_folder import search_in_folder as search_in_folder
-    from .shot import ShotResult as ShotResult
-
-__all__, __getattr__, __dir__ = lazy_names(
-    __name__,
-    {
-        ".flare_curves": ("flare_curves",),
-        ".lens_flares": ("camera_project", "lens_flares", "scene_flare"),
-        ".light_places": ("lights_at_pixels", "with_tracks"),
-        ".measure_merge": ("merge_photographs",),
-        ".measure_provenance": ("STAGES",),
-        ".measure_run": ("StageResult", "run_stages"),
-        ".project_files": ("open_project_files",),
-        ".scene_prediction": ("NearbySearch", "ScenePrediction", "predict_scene"),
-        ".searches.lens_search": ("LensSearch", "search_lenses"),
-        ".searches.search_folder": ("SearchLimits", "search_in_folder"),
-        ".shot": ("ShotResult",),
-    },
-)
+__all__, __getattr__, __dir__ = lazy_names(__name__)

@@ -1,0 +1,9 @@
+from .merging.settings import MergeSettings as MergeSettings
+from .pipeline.compress_stage import compress_ghosts as compress_ghosts
+from .pipeline.find_stage import find_ghosts as find_ghosts
+from .pipeline.fit_stage import fit_ghosts as fit_ghosts
+from .pipeline.merge_stage import merge_captures as merge_captures
+from .pipeline.settings import MeasureSettings as MeasureSettings
+from .pipeline.track_stage import track_ghosts as track_ghosts
+from .replay.measured_project import render_measured as render_measured
+from .replay.model_image import replay_model as replay_model
