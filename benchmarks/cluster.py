@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from flarewright import Camera, Light, LightKey, Output, Project, Quality
+from flarewright.jobs.answers import Done
 from flarewright.jobs.cluster.executor import Cluster, open_cluster
-from flarewright.jobs.processes import Done, work_off
+from flarewright.jobs.processes import work_off
 from flarewright.workflow.shot_frame import ShotPlan
 
 Row = Callable[..., dict[str, Any]]

@@ -16,7 +16,8 @@ from flarewright.design.results import report
 from flarewright.design.solvers import pool_search
 from flarewright.design.thesis import benchmark as thesis
 from flarewright.io.lens.toml_lens import read_lens
-from flarewright.io.project.project_file import project_text, read_project
+from flarewright.io.project.project_file import read_project
+from flarewright.io.project.project_text import project_text
 from flarewright.model import Lens
 
 PROJECT = """

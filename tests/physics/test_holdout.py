@@ -7,7 +7,8 @@ from judge import judge, probabilities
 from PIL import Image
 
 from flarewright.errors import ProjectError
-from flarewright.io.project.project_file import project_text, read_project
+from flarewright.io.project.project_file import read_project
+from flarewright.io.project.project_text import project_text
 from flarewright.io.render_state.reference_state import read_reference_state
 from flarewright.model import Camera, Holdout, Light, Lines, Output, Polygon, Project, Quality, Rectangle
 from flarewright.optics.colour.rgb import luminance_weights

@@ -7,7 +7,8 @@ from PIL import Image
 from flarewright.errors import FlarewrightError, ProjectError
 from flarewright.io.images.exr import read_exr
 from flarewright.io.images.half import exr_scale
-from flarewright.io.project.project_file import project_text, read_project
+from flarewright.io.project.project_file import read_project
+from flarewright.io.project.project_text import project_text
 from flarewright.model import Backplate, Camera, Light, LightCurve, LightKey, PlateSearch, Project, Quality, Surface
 from flarewright.render.scene.pixel_place import image_px
 from flarewright.render.scene.resolve import load_lens

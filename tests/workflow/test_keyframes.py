@@ -10,7 +10,8 @@ from pydantic import ValidationError
 
 from flarewright import Light, LightCurve, LightKey, Project, ProjectCurve, Timeline
 from flarewright.errors import ProjectError
-from flarewright.io.project.project_file import project_from_data, project_text
+from flarewright.io.project.project_file import project_from_data
+from flarewright.io.project.project_text import project_text
 from flarewright.model.lens.prescription import LEAST_F_NUMBER
 from flarewright.workflow.keyframes import (
     frame_rate,

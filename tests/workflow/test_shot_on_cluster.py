@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from flarewright import Camera, Light, LightKey, Output, Project, Quality, dataset, shot
-from flarewright.io.project.project_file import project_text
+from flarewright.io.project.project_text import project_text
 from flarewright.model.project.dataset import DatasetSpec
 
 pytestmark = [

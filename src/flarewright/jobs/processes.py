@@ -15,18 +15,6 @@ from ..kernels.jit.warmup_processes import cores, start_python
 from .answers import Done, result_of
 from .worker import named
 
-__all__ = [
-    "Done",
-    "Executor",
-    "end_processes",
-    "fitting",
-    "how_it_ended",
-    "next_answer",
-    "shares",
-    "start_process",
-    "work_off",
-]
-
 # time that a process gets to write its present result when it has to end
 _PATIENCE_S = 10.0
 # libraries that read their number of threads from the environment when they are imported

@@ -7,7 +7,7 @@ from math import pi
 from typing import Literal
 
 from ..errors import ProjectError
-from ..io.images.transfer import Transfer
+from ..model.project.backplate import Transfer
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from ..io.images.exr import read_exr, write_exr
 from ..io.images.exr_attributes import shot_attributes
 from ..io.images.half import half_scale
 from ..io.project.named_files import picture_files
-from ..io.project.project_file import project_text
+from ..io.project.project_text import project_text
 from ..jobs.frame_list import FramePattern
 from ..jobs.worker import WRITING
 from ..measure.replay.measured_project import is_measured, render_measured

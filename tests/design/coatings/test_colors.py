@@ -28,7 +28,8 @@ from flarewright.design.coatings.colors import (
 )
 from flarewright.design.problem.objective import algorithm_2
 from flarewright.design.problem.prescription import structure_of
-from flarewright.design.solvers.solvers import Limits, chosen
+from flarewright.design.solvers.evolution_log import Limits
+from flarewright.design.solvers.solvers import chosen
 from flarewright.errors import ProjectError
 from flarewright.measure.core.checkpoint import journal
 from flarewright.model import Design, GhostTarget, Light, Preset, Project

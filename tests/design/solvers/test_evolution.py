@@ -13,10 +13,11 @@ from flarewright.design.problem.objective import fitness_thesis, own_objective
 from flarewright.design.problem.prescription import Structure, structures
 from flarewright.design.problem.problem import Problem
 from flarewright.design.solvers.cma_es import folded
+from flarewright.design.solvers.evolution_log import Limits
 from flarewright.design.solvers.genes import genes_of
 from flarewright.design.solvers.polish import polish
 from flarewright.design.solvers.pool_search import PoolState
-from flarewright.design.solvers.solvers import NAMES, Limits, chosen, solve_with
+from flarewright.design.solvers.solvers import NAMES, chosen, solve_with
 from flarewright.design.thesis.benchmark import task_of
 from flarewright.design.thesis.trials import Trial
 from flarewright.errors import ProjectError

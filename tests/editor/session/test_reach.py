@@ -18,7 +18,7 @@ from flarewright.errors import FlarewrightError, ProjectError
 from flarewright.io.files.state_folder import state_folder
 from flarewright.io.lens.library import lens_path
 from flarewright.io.project.named_files import FIELDS
-from flarewright.io.project.project_file import project_text
+from flarewright.io.project.project_text import project_text
 from flarewright.model import Holdout, Project
 
 OUTSIDE = "is outside the folders of this editor; start it with --root"

@@ -10,7 +10,8 @@ import pytest
 
 from flarewright.errors import ProjectError
 from flarewright.io.lens.coating_text import parse_coating_choice
-from flarewright.io.project.project_file import project_json_schema, project_text, read_project
+from flarewright.io.project.project_file import project_json_schema, read_project
+from flarewright.io.project.project_text import project_text
 from flarewright.io.project.spectrum_text import parse_spectrum, spectrum_text
 from flarewright.model import (
     D65,

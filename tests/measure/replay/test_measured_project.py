@@ -13,7 +13,8 @@ from flarewright.errors import FlarewrightError
 from flarewright.io.images.exr import read_exr
 from flarewright.io.images.half import rounded_to_half
 from flarewright.io.measurement.ghost_model_file import write_ghost_model
-from flarewright.io.project.project_file import project_text, read_project
+from flarewright.io.project.project_file import read_project
+from flarewright.io.project.project_text import project_text
 from flarewright.measure.replay.measured_project import check_measured, render_any, render_measured, with_sensor
 from flarewright.measure.replay.model_image import replay_model
 from flarewright.model import Art, Camera, Iris, Light, Project, Rule

@@ -19,12 +19,13 @@ import pytest
 from flarewright import Camera, Design, GhostTarget, Light, Project
 from flarewright.design.problem.target import problem_of
 from flarewright.design.solvers import pool_search
+from flarewright.design.solvers.evolution_log import Limits
 from flarewright.design.solvers.pool_search import PoolState, solve
 from flarewright.design.solvers.restarts import merged, restart_seed, so_far
 from flarewright.design.solvers.search_state import read_state, write_state
-from flarewright.design.solvers.solvers import Limits, chosen
+from flarewright.design.solvers.solvers import chosen
 from flarewright.errors import FlarewrightError, ProjectError
-from flarewright.io.project.project_file import project_text
+from flarewright.io.project.project_text import project_text
 from flarewright.workflow.searches.lens_search import search_lenses
 from flarewright.workflow.searches.search_restarts import Restart, RestartPlan, Sharing, search_restart, search_restarts
 

@@ -19,8 +19,9 @@ from .checks import check_color_fitness, check_films, check_fitness, check_time
 from .partial_work import partial_work
 
 if TYPE_CHECKING:
+    from ...design.solvers.evolution_log import Limits
     from ...design.solvers.pool_search import Observer
-    from ...design.solvers.solvers import Choice, Limits
+    from ...design.solvers.solvers import Choice
     from ...design.thesis.figures import Run
     from ...design.thesis.trials import Name, Trial
     from ...typing import Floats, Report
@@ -135,7 +136,7 @@ def _trial(options: BenchmarkOptions) -> Trial:
 
 def _limits(time_s: float | None, cpu_s: float | None) -> Limits:
     """Return the time limits of each seed, checked."""
-    from ...design.solvers.solvers import Limits
+    from ...design.solvers.evolution_log import Limits
 
     if time_s is not None and cpu_s is not None:
         raise ProjectError("--time and --cpu-time both limit a seed; keep one")

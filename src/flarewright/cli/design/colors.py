@@ -134,9 +134,9 @@ def _search(
     """Search until Ctrl-C and write the lens; return the coatings, and whether it was Ctrl-C."""
     from ...design.coatings.color_genes import colors_with
     from ...design.coatings.colors import coated
-    from ...design.solvers.solvers import Limits
+    from ...design.solvers.evolution_log import Limits
     from ...io.lens.lens_writer import write_lens
-    from ...io.project.project_file import project_text
+    from ...io.project.project_text import project_text
 
     time_s = 60.0 if choice.evolves and options.time_s is None else options.time_s
     inputs = [

@@ -50,7 +50,7 @@ def target(
     angles = [field_angles(text) for text in light]
     if not all(hypot(*one) > 0.0 for one in angles):
         raise ProjectError("a light on the axis puts every ghost at its middle; give the light's true angles")
-    from ...io.project.project_file import project_text
+    from ...io.project.project_text import project_text
     from ...workflow.searches.flare_targets import project_of_model, project_of_picture
 
     if source.suffix.lower() == ".json":

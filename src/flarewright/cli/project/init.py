@@ -44,7 +44,7 @@ def init(
         check_place(output, ".toml")
         check_free(output, force)
     from ...io.measurement.ghost_model_file import is_ghost_model_file
-    from ...io.project.project_file import project_text
+    from ...io.project.project_text import project_text
     from ...model import Light
 
     here = Light(field_deg=angles)

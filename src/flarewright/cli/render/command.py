@@ -365,7 +365,7 @@ def _write(
     from ...io.images.cryptomatte import NAME
     from ...io.images.exr import write_exr
     from ...io.images.half import exr_scale
-    from ...io.project.project_file import project_text
+    from ...io.project.project_text import project_text
     from ...render.image.gamut import negative_share
     from ...render.image.ocio_space import in_file_space
 

@@ -13,7 +13,7 @@ from ...errors import FlarewrightError
 from ...io.files.atomic_write import write_bytes_atomically, write_text_atomically
 from ...io.images.html_page import html_page
 from ...io.lens.lens_writer import write_lens
-from ...io.project.project_file import project_text
+from ...io.project.project_text import project_text
 from ...model import AsLens, Output, Project, Quality
 from ...model.project.design import Design, GhostTarget
 from ...typing import Floats

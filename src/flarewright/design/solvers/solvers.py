@@ -19,8 +19,6 @@ from .pool_search import KEPT, PoolState, solve
 OURS, CMAES = "pools", "cmaes"
 NAMES = (OURS, *ALGORITHMS, CMAES)
 
-__all__ = ["NAMES", "OURS", "Choice", "Limits", "Solution", "chosen", "evolve_with", "make_ready", "solve_with"]
-
 
 @dataclass(frozen=True)
 class Choice:

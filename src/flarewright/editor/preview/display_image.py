@@ -7,7 +7,6 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ...render.image.aces_view import aces_available
 from ...render.image.display import view
 from ...typing import Pixels
 from ..session.view_settings import View
@@ -76,6 +75,3 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
     buffer = BytesIO()
     Image.fromarray(pixels).save(buffer, format="PNG", compress_level=1)
     return buffer.getvalue()
-
-
-__all__ = ["aces_available", "jpeg", "pixels_of", "png"]

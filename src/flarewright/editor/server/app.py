@@ -279,7 +279,7 @@ def _export(workspace: Workspace, request: Request, _body: Any) -> Any:
         return Response(png(shown_pixels(workspace.screen)), media_type="image/png", headers=name)
     if kind == "csv" and workspace.screen.seen is None:
         raise ProjectError("the ghosts are still being measured; try again in a moment")
-    from ...io.project.project_file import project_text
+    from ...io.project.project_text import project_text
 
     if kind == "lens":
         text = files.lens_text(project)

@@ -9,6 +9,7 @@ from ...io.project.spectrum_text import spectrum_text
 from ...measure.replay.measured_project import is_measured
 from ...model import Design, Project
 from ...optics.rays.pack import preset_names
+from ...render.image.aces_view import aces_available
 from ...render.scene.resolve import open_lens
 from ...workflow.keyframes import length_s
 from ..commands.design_targets import ghost_target_names
@@ -16,7 +17,7 @@ from ..commands.ghosts import override_of, soloed
 from ..commands.lens import prescription, table_of
 from ..commands.shot import coating_text, iris_of
 from ..design.search_job import Solver
-from ..preview.display_image import FALSE_COLOURS, aces_available
+from ..preview.display_image import FALSE_COLOURS
 from ..preview.render_picture import pictured, rest_size, same_ghosts, view_size
 from ..preview.viewport import Screen
 from ..session.history import History, before_mask, design_before_added, design_before_scratch

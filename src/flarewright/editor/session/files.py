@@ -23,7 +23,8 @@ from ...io.lens.lens_writer import format_lens
 from ...io.lens.library import lens_path, library_name, near_names
 from ...io.measurement.ghost_model_file import is_ghost_model_file
 from ...io.project.look_file import look_text, read_look
-from ...io.project.project_file import project_from_data, project_text, read_project
+from ...io.project.project_file import project_from_data, read_project
+from ...io.project.project_text import project_text
 from ...measure.replay.measured_project import is_measured, render_any, with_sensor
 from ...model import Camera, Iris, Lens, Light, Look, Project
 from ...optics.lens.paraxial import first_order

@@ -9,8 +9,9 @@ import numpy as np
 
 from ...colorimetry import D65_WHITE, rgb_to_xyz
 from ...colorimetry import PRIMARIES as KNOWN
+from ...model.project.backplate import Transfer
 from ...typing import Pixels
-from ..images.transfer import Transfer, decoded
+from ..images.transfer import decoded
 
 WEIGHTS = {"bt709": (0.2126, 0.0722), "bt601": (0.299, 0.114), "bt2020": (0.2627, 0.0593), "smpte240m": (0.212, 0.087)}
 """Weights of red and blue in luma, of each matrix (ITU-R BT.709, BT.601 and BT.2020, SMPTE 240M)."""

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import FileError
+from ...model.project.backplate import Transfer
 from ..files.door import shown
-from ..images.transfer import Transfer
 from .decoder import opened, video_of
 from .film_colour import FilmCoding
 

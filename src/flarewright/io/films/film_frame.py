@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from ...errors import FileError, FlarewrightError
+from ...model.project.backplate import Transfer
 from ..files.door import shown
 from ..images.plate_picture import PlatePicture
-from ..images.transfer import Transfer, white_of
+from ..images.transfer import white_of
 from .decoder import av_module, exact_flags, opened, video_of
 from .film_colour import linear_pixels
 from .film_file import Film, open_film

@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from ...errors import FileError, optional
+from ...model.project.backplate import Transfer
 from ...model.project.camera import Colorspace
 from ...typing import Pixels
 from ..files.door import outside, refuse_claim, shown
 from .exr import CHROMATICITIES, read_exr_layer
 from .half import HALF_MAX
 from .picture import SCREEN
-from .transfer import Transfer, decoded, white_of
+from .transfer import decoded, white_of
 
 _TIFF = (".tif", ".tiff")
 PLATE_SUFFIXES = (".exr", *_TIFF, *SCREEN)

@@ -11,8 +11,6 @@ from ...model.project.backplate import Transfer
 from ...typing import Pixels
 from .picture import decode_srgb
 
-__all__ = ["HDR_WHITE_CD_M2", "TRANSFERS", "Transfer", "decoded", "encoded_rec709", "white_of"]
-
 TRANSFERS: tuple[Transfer, ...] = get_args(Transfer)
 
 HDR_WHITE_CD_M2 = 203.0

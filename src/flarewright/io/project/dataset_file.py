@@ -16,7 +16,8 @@ from ..files.sentences import summary
 from ..files.type_slips import record_of
 from ..lens.coating_text import parse_coating_choice
 from .file_of_kind import read_file_of_kind
-from .project_file import Sections, lens_location, validation_messages
+from .project_file import Sections, validation_messages
+from .project_text import lens_location
 
 _ANY = tuple(distributions.KINDS.values())
 _SECTIONS: Sections = {

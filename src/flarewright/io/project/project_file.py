@@ -44,21 +44,8 @@ from ..lens.coating_text import coating_from, parse_coating, parse_coating_choic
 from ..lens.plate_text import parse_plate
 from ..lens.toml_lens import lens_from_table
 from .file_of_kind import read_file_of_kind
-from .project_text import ABOUT, FILES, HOLDOUT_FILES, lens_location, project_text
+from .project_text import ABOUT, FILES, HOLDOUT_FILES, lens_location
 from .spectrum_text import parse_spectrum
-
-__all__ = [
-    "Sections",
-    "accept_text",
-    "expand_coating",
-    "expand_light",
-    "lens_location",
-    "project_from_data",
-    "project_json_schema",
-    "project_text",
-    "read_project",
-    "validation_messages",
-]
 
 Sections = dict[str, tuple[type[BaseModel], ...]]
 

@@ -19,8 +19,8 @@ from ..files.sentences import shorten, summary
 from ..files.text_file import check_version
 from ..files.type_slips import record_of
 from .file_of_kind import NEWEST, read_file_of_kind
-from .project_file import Sections, accept_text, expand_coating, expand_light, lens_location, validation_messages
-from .project_text import ABOUT
+from .project_file import Sections, accept_text, expand_coating, expand_light, validation_messages
+from .project_text import ABOUT, lens_location
 
 _SECTIONS: Sections = {
     "": (Scene,),

@@ -14,8 +14,8 @@ from ...io.films.film_frame import read_film_frame
 from ...io.films.film_kind import is_film
 from ...io.images.plate_image import read_matte
 from ...io.images.plate_picture import PlatePicture, read_plate
-from ...io.images.transfer import Transfer
 from ...jobs.frame_list import FramePattern, frames_text
+from ...model.project.backplate import Transfer
 from ...plates.settings import PlateSettings
 from ...typing import Pixels
 

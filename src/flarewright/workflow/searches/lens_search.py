@@ -124,9 +124,9 @@ def search_lenses(
     """
     from ...design.problem.impossible import obstacles
     from ...design.problem.target import problem_of
-    from ...design.solvers.evolution_log import until
+    from ...design.solvers.evolution_log import Limits, until
     from ...design.solvers.pool_search import PoolState
-    from ...design.solvers.solvers import Limits, chosen, make_ready, solve_with
+    from ...design.solvers.solvers import chosen, make_ready, solve_with
     from .search_restarts import search_restarts
 
     problem, settled = problem_of(project)

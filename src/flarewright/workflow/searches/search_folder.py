@@ -156,7 +156,7 @@ def search_to_resume(folder: Path, project: Project, seed: int) -> PoolState:
     from ...design.solvers.pool_search import PoolState
     from ...design.solvers.search_state import read_state
     from ...io.files.text_file import read_text
-    from ...io.project.project_file import project_text
+    from ...io.project.project_text import project_text
 
     if not (folder / "search.json").exists():
         return PoolState(seed)

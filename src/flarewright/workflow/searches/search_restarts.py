@@ -316,9 +316,10 @@ def search_restart(
     FlarewrightError
         The stored state is damaged, or a state cannot be written.
     """
+    from ...design.solvers.evolution_log import Limits
     from ...design.solvers.pool_search import PoolState
     from ...design.solvers.search_state import write_state
-    from ...design.solvers.solvers import Limits, make_ready, solve_with
+    from ...design.solvers.solvers import make_ready, solve_with
 
     state = _stored(plan, item.number, item.seed) or PoolState(item.seed)
     left = None if item.until_s is None else item.until_s - state.seconds

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...io.project.project_file import project_text
+from ...io.project.project_text import project_text
 from ...model import Layer, Project
 from ...model.project.dataset import DatasetSpec
 from ...render.image.compose import beauty
@@ -176,6 +176,3 @@ def _facts(
             if number in by_number
         ],
     }
-
-
-__all__ = ["Pictures", "draw_item", "draw_pictures"]

@@ -26,7 +26,7 @@ from ...model.project.dataset import SPLITS, DatasetSpec
 from ...render.scene.resolve import open_lens
 from .background import list_backgrounds
 from .draw import check_lenses, draw_item, drawn_lens, splits_of
-from .item import DatasetPlan, ItemResult, fragment, item_record, write_item
+from .item import DatasetPlan, ItemResult, fragment, item_record
 from .layout import read_record
 
 if TYPE_CHECKING:
@@ -401,6 +401,3 @@ def _result(
         processes,
         tuple(remarks),
     )
-
-
-__all__ = ["DatasetResult", "dataset", "plan_of", "write_item"]
