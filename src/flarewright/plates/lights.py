@@ -14,13 +14,14 @@ import numpy as np
 
 from ..model import Light, Rgb
 from ..model.project.light import LEAST_LIGHT_DEG, Rectangle
+from ..render.image.photographic_exposure import SUN_LUX
 from ..render.scene.direct_image import direct_image
 from ..render.scene.pixel_place import direct_images
 from ..render.scene.resolve import ResolvedProject
 from ..typing import Floats, Mask
 from .detection import LUMINANCE
 from .field_map import FieldMap
-from .settings import SUNLIT_LX, SourceKind
+from .settings import SourceKind
 from .tracking import Tracks
 
 # sources narrower than these are points: part of the plate's width, pixels
@@ -185,7 +186,7 @@ def lights_at(
             assert plate.known is not None
             assert plate.white is not None
             # white paper that faces an illuminance E has the luminance E / pi
-            irradiance = pi * plate.white * plate.known.illuminance_lx / SUNLIT_LX
+            irradiance = pi * plate.white * plate.known.illuminance_lx / SUN_LUX
             rgb = rgb / (rgb @ LUMINANCE) * irradiance * named[k] * factor * plate.gain
         intensity = float(rgb @ LUMINANCE)
         if not intensity > 0.0:

@@ -8,6 +8,7 @@ from typing import Literal
 
 from ..errors import ProjectError
 from ..model.project.backplate import Transfer
+from ..render.image.photographic_exposure import SUN_LUX
 
 
 @dataclass(frozen=True)
@@ -111,8 +112,6 @@ class PlateSettings:
             )
 
 
-SUNLIT_LX = 100_000.0
-"""Illuminance by the sun on a plane that faces it, lx: clear sky, the sun high."""
 HIGH_BEAM_CD = 30_000.0
 """Luminous intensity of a headlight on high beam, cd."""
 
@@ -147,7 +146,7 @@ def parse_source(text: str) -> SourceKind:
     word, _, lumen = word.partition(":")
     wanted = "write sun, headlight@METRES or lamp:LUMEN@METRES, such as lamp:800@3"
     if word == "sun" and not at and not lumen:
-        return SourceKind("sun", SUNLIT_LX)
+        return SourceKind("sun", SUN_LUX)
     if word not in ("headlight", "lamp") or (word == "headlight") == bool(lumen):
         raise ProjectError(f"--source {text[:60]!r} is no known lamp; {wanted}")
     try:

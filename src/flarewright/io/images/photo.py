@@ -28,8 +28,6 @@ _RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".rw2", ".orf", ".pef", 
 _TIFF = (".tif", ".tiff")
 PHOTO_SUFFIXES = (*_RAW, *_TIFF, ".exr", ".npy")
 
-Band = Pixels
-
 # EXIF tags of the Exif IFD: exposure time, f-number, ISO speed, focal length
 _EXIF = {33434: "exposure_s", 33437: "f_number", 34855: "iso", 37386: "focal_mm"}
 _EXIF_IFD = 0x8769
@@ -67,7 +65,7 @@ class Photo:
 
     path: Path
     size_px: tuple[int, int]
-    rows: Callable[[int, int], Band]
+    rows: Callable[[int, int], Pixels]
     black_level: tuple[float, float, float] = (0.0, 0.0, 0.0)
     white_level: float | None = None
     samples: tuple[int, int, int] = (1, 1, 1)
@@ -178,7 +176,7 @@ def _from_array(path: Path, picture: _Picture, white_level: float | None) -> Pho
         white_level = float(np.iinfo(dtype).max)
     load = lru_cache(maxsize=1)(picture.load)
 
-    def rows(low: int, high: int) -> Band:
+    def rows(low: int, high: int) -> Pixels:
         part = load()[low:high]
         if part.ndim == 2:
             part = np.broadcast_to(part[..., None], (*part.shape, 3))
@@ -302,11 +300,11 @@ def _raw(rawpy: Any, path: Path) -> Iterator[Any]:
 
 def _mosaic_rows(
     load: Callable[[], NDArray[Any]], colors: list[str], width: int, white: float
-) -> Callable[[int, int], Band]:
+) -> Callable[[int, int], Pixels]:
     """Average two by two photosites into one pixel."""
     at = {color: [divmod(k, 2) for k, name in enumerate(colors) if name == color] for color in "RGB"}
 
-    def rows(low: int, high: int) -> Band:
+    def rows(low: int, high: int) -> Pixels:
         band = np.empty((high - low, width, 3), np.float32)
         part = load()[2 * low : 2 * high, : 2 * width]
         for c, color in enumerate("RGB"):
@@ -325,10 +323,10 @@ def _blocks(photo: Photo, block: int) -> Photo:
         raise FlarewrightError(f"{photo.path} is smaller than one block of {block} pixels; choose smaller blocks")
     white = photo.white_level
 
-    def rows(low: int, high: int) -> Band:
+    def rows(low: int, high: int) -> Pixels:
         band = photo.rows(low * block, high * block)[:, : width * block]
         parts = band.reshape(high - low, block, width, block, 3)
-        mean: Band = parts.mean(axis=(1, 3), dtype=np.float32)
+        mean: Pixels = parts.mean(axis=(1, 3), dtype=np.float32)
         if white is not None:
             clipped = parts.max(axis=(1, 3)) >= white
             mean[clipped] = np.maximum(mean[clipped], np.float32(white))

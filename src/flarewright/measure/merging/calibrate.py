@@ -13,11 +13,11 @@ import numpy as np
 from ...errors import FlarewrightError
 from ...io.images.photo import Photo, open_photo
 from ...model.measurement.capture import CameraNoise, Capture, Matrix3
-from ...typing import Mask
+from ...typing import Mask, Pixels
 from ..core.sampling import evenly_spaced
 from .exposure_check import refuse_contradiction
 from .hdr_merge import Exposure
-from .noise import Band, Noise, Transfer, common_black, fit_transfer, noise_of, smooth, transfers
+from .noise import Noise, Transfer, common_black, fit_transfer, noise_of, smooth, transfers
 from .settings import CalibrationSettings, MergeSettings
 
 
@@ -50,10 +50,10 @@ class CameraCalibration:
     """
 
     camera: CameraNoise
-    black: Band
+    black: Pixels
     black_noise: float
     white: float
-    response: Band | None
+    response: Pixels | None
     size_px: tuple[int, int]
     samples: tuple[int, int, int]
     step: float
@@ -200,7 +200,7 @@ def _see_something(shortest: Sequence[Photo], white: float, settings: Calibratio
 def _black(
     first: Photo, camera: CameraNoise, darks: Sequence[Photo], pairs: Sequence[tuple[Photo, Photo, float]],
     white: float, remarks: list[str], settings: CalibrationSettings,
-) -> Band:  # fmt: skip
+) -> Pixels:  # fmt: skip
     if darks:
         width, height = first.size_px
         picture = np.zeros((height, width, 3))
@@ -226,7 +226,7 @@ def _black(
 
 
 def _levels_fit(
-    camera: CameraNoise, black: Band, white: float, darks: Sequence[Photo], lights: Sequence[Photo],
+    camera: CameraNoise, black: Pixels, white: float, darks: Sequence[Photo], lights: Sequence[Photo],
     settings: CalibrationSettings,
 ) -> None:  # fmt: skip
     """Raise when a black or white level contradicts the photographs."""
@@ -264,9 +264,9 @@ def _levels_fit(
 class _Compared:
     """Some rows of one channel of two exposures of the same light, as read."""
 
-    first: Band
-    second: Band
-    around: Band
+    first: Pixels
+    second: Pixels
+    around: Pixels
     free: Mask
     rows: tuple[int, int]
     channel: int
@@ -284,7 +284,7 @@ def _compared(short: Photo, long: Photo, white: float, settings: CalibrationSett
 
 
 def _points(
-    pairs: Sequence[tuple[Photo, Photo, float]], black: Band, white: float, samples: tuple[int, int, int],
+    pairs: Sequence[tuple[Photo, Photo, float]], black: Pixels, white: float, samples: tuple[int, int, int],
     black_noise: float, settings: CalibrationSettings,
 ) -> list[Transfer]:  # fmt: skip
     found: list[Transfer] = []
@@ -321,7 +321,7 @@ def _dark_points(
     return found
 
 
-def _response(flats: Sequence[Photo], black: Band, white: float, settings: CalibrationSettings) -> Band | None:
+def _response(flats: Sequence[Photo], black: Pixels, white: float, settings: CalibrationSettings) -> Pixels | None:
     """Return each pixel's response over the mean of its neighbourhood.
 
     Wider variation is kept: it is the vignetting of the direct image, which ghosts do not share.

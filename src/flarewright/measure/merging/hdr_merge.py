@@ -20,8 +20,6 @@ from ...typing import Floats, Mask, Pixels
 from .noise import Noise, smooth
 from .settings import ExposureSettings
 
-Band = Pixels
-
 # rows in memory at a time
 ROWS = 128
 
@@ -48,11 +46,11 @@ class Exposure:
     photo: Photo
     seconds: float
     noise: tuple[Noise, Noise, Noise]
-    black: Band
+    black: Pixels
     white: float
-    response: Band | None = None
+    response: Pixels | None = None
 
-    def read(self, low: int, high: int) -> tuple[Band, Mask]:
+    def read(self, low: int, high: int) -> tuple[Pixels, Mask]:
         """Return values above black and the mask of clipped ones, of rows low to high."""
         raw = self.photo.rows(low, high)
         clipped = raw >= self.white
@@ -62,9 +60,9 @@ class Exposure:
         return above, clipped
 
     @property
-    def full(self) -> Band:
+    def full(self) -> Pixels:
         """Clipping level above black of red, green and blue, shape (3,)."""
-        full: Band = np.float32(self.white) - self.black.reshape(-1, 3).mean(axis=0)
+        full: Pixels = np.float32(self.white) - self.black.reshape(-1, 3).mean(axis=0)
         return full
 
     def variance(self, units: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -77,7 +75,7 @@ class Exposure:
 
 def merge_exposures(
     exposures: Sequence[Exposure], *, rows: int = ROWS, settings: ExposureSettings = ExposureSettings()
-) -> tuple[Band, Band]:
+) -> tuple[Pixels, Pixels]:
     """Merge the exposures of one constellation, one band of rows at a time.
 
     Parameters
@@ -107,7 +105,7 @@ def merge_exposures(
     return radiance, variance
 
 
-def without_idle_digits(radiance: Band, variance: Band) -> tuple[Band, Band]:
+def without_idle_digits(radiance: Pixels, variance: Pixels) -> tuple[Pixels, Pixels]:
     """Round away digits below the noise, which makes files less than half as large.
 
     Parameters
@@ -129,7 +127,7 @@ def without_idle_digits(radiance: Band, variance: Band) -> tuple[Band, Band]:
 
 
 def _merge_band(
-    exposures: Sequence[Exposure], readings: Sequence[tuple[Band, Mask]], settings: ExposureSettings
+    exposures: Sequence[Exposure], readings: Sequence[tuple[Pixels, Mask]], settings: ExposureSettings
 ) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
     counts = np.zeros(readings[0][0].shape, np.float64)
     seconds = np.zeros(counts.shape, np.float64)
@@ -159,7 +157,7 @@ def _level(counts: Floats, seconds: Floats, otherwise: NDArray[np.floating] | No
         return np.where(time > 0.0, total / time, 0.0 if otherwise is None else smooth(otherwise))
 
 
-def _brightest(shortest: Exposure) -> Band:
+def _brightest(shortest: Exposure) -> Pixels:
     """Return the lower bound of a pixel that was clipped in every exposure; 0 when the clipping level is unknown."""
     full = shortest.full / np.float32(shortest.seconds)
     return np.where(np.isfinite(full), full, 0.0).astype(np.float32)

@@ -18,8 +18,6 @@ from ...errors import FlarewrightError
 from ...typing import Floats, Mask, Pixels
 from .settings import LightSettings
 
-Band = Pixels
-
 
 @dataclass(frozen=True)
 class LightSighting:
@@ -56,7 +54,7 @@ class LightSighting:
     other_px: tuple[float, float] | None = None
 
 
-def find_light(radiance: Band, variance: Band, settings: LightSettings = LightSettings()) -> LightSighting:
+def find_light(radiance: Pixels, variance: Pixels, settings: LightSettings = LightSettings()) -> LightSighting:
     """Locate the light in a frame; only the whole run shows whether it is one (`camera_geometry.believable`).
 
     Parameters

@@ -19,8 +19,6 @@ from ...model.measurement.capture import CameraNoise
 from ...typing import Floats, Mask, Pixels
 from .settings import CalibrationSettings
 
-Band = Pixels
-
 # side of the mean that estimates a pixel's level for its variance; the pixel's own noise enters with one ninth
 _SIDE = 3
 
@@ -100,7 +98,7 @@ class Transfer:
 
 
 def transfers(
-    first: Band, second: Band, around: Band, ratio: float, free: Mask, samples: float,
+    first: Pixels, second: Pixels, around: Pixels, ratio: float, free: Mask, samples: float,
     black_noise: float = 0.0, settings: CalibrationSettings = CalibrationSettings(),
 ) -> list[Transfer]:  # fmt: skip
     """Compare two readings of the same light, in bins of its level.
@@ -208,7 +206,7 @@ def _as_camera(slope: float, floor: float, covariance: Floats, camera: CameraNoi
 
 
 def common_black(
-    pairs: Iterable[tuple[Band, Band, Band, Mask]], settings: CalibrationSettings = CalibrationSettings()
+    pairs: Iterable[tuple[Pixels, Pixels, Pixels, Mask]], settings: CalibrationSettings = CalibrationSettings()
 ) -> float | None:
     """Find the black level from pairs of exposures of the same light: the common origin of both.
 

@@ -17,8 +17,6 @@ from ..core.binning import binned
 from ..core.robust import MAD_TO_SIGMA
 from .settings import GeometrySettings
 
-Band = Pixels
-
 
 @dataclass(frozen=True)
 class Reduced:
@@ -41,7 +39,7 @@ class Reduced:
 
 
 def reduced_frame(
-    radiance: Band, variance: Band, light_px: tuple[float, float], settings: GeometrySettings = GeometrySettings()
+    radiance: Pixels, variance: Pixels, light_px: tuple[float, float], settings: GeometrySettings = GeometrySettings()
 ) -> Reduced:
     """Average blocks of pixels to a frame about 360 pixels wide.
 
@@ -53,7 +51,7 @@ def reduced_frame(
     """
     block = max(1, round(radiance.shape[1] / settings.axis_width_px))
 
-    def mean(values: Band) -> Floats:
+    def mean(values: Pixels) -> Floats:
         return binned(values.mean(axis=2, dtype=np.float64), block)
 
     return Reduced(mean(radiance), mean(variance) / (3 * block**2), (light_px[0] / block, light_px[1] / block), block)

@@ -7,7 +7,7 @@ from math import log2
 from ...errors import ProjectError
 
 SUN_LUX = 100_000.0
-"""Illuminance of the high sun on a plane that faces it, rounded."""
+"""Illuminance by the high sun in a clear sky on a plane that faces it, lx, rounded."""
 
 GREY = 0.18
 

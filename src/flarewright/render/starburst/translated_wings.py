@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 
 from ...kernels.diffraction.wings import add_moved
 from ...typing import Floats, Indices, Pixels
-from .pattern import Painter
+from .pattern import BAND, Painter
 
-# rows per task
-BAND = 64
 # a light farther outside the picture, in parts of its side, would make the atlas large and is drawn separately
 FAR_PART = 0.5
 # subpixel offsets of the atlas per axis
