@@ -14,6 +14,7 @@ Python calls `trace_nodes`, `trace_squares` and `trace_hits` (`sequential`), `fi
 - `samples`: `Samples`, the rays of the pre-pass
 - `grid_limits`: `GridLimits`, how far the adaptive grid is refined
 - `adaptive_grid`: `build_mesh`, a traced and triangulated quadtree over that part
+- `cell_neighbours`: light of its leaves that enters cells beside them: `halve_neighbours`, `has_lit_side`
 - `ray_interpolation`: `rays_between`, `visible_areas`, rays at other wavelengths
 - `torn_triangles`: `cut_torn`, the parts that pass of triangles in which some rays fail
 - `representative_rays`: `seen_rays`, `choose_representatives`, `shift_quantile`

@@ -3,12 +3,11 @@
 import numpy as np
 
 from ..jit.decorators import borrowing, compiled, inlined, inner
+from .cell_neighbours import EMPTY, FLAT, LEAF, SPLIT, UNKNOWN, halve_neighbours, has_lit_side
 from .lens_arrays import at_wavelength
 from .pupil_prepass import rejected
 from .sequential import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_lanes
 
-# a FLAT leaf is drawn without the midpoints of its edges, a LEAF with them
-UNKNOWN, LEAF, SPLIT, EMPTY, FLAT = 0, 1, 2, 3, 4
 # why a cell is halved, in bits above those of its verdict: `REASON * k + SPLIT` for the k-th of `REASONS`
 REASON = 8
 REASONS = (
@@ -293,40 +292,60 @@ def build_mesh(steps, lens, light, crossings, iris, box, coarse, limits):
     halved = np.empty(len(REASONS), dtype=np.int64)
     for k in range(halved.size):
         halved[k] = 0
-    cells = np.empty(nx * ny, dtype=np.int64)
+    # levels and numbers of cells to classify: the coarsest, then quarters of left-out cells that light enters
+    begun, n_begun = np.empty((nx * ny, 2), dtype=np.int64), nx * ny
     for k in range(nx * ny):
-        cells[k] = k
-    for level in range(max_level + 1):
-        if level > depth:
-            depth = level
-            lattice, state = _enlarged(lattice, state, offsets[depth + 1])
-        first = n_nodes
-        pupil, data, n_nodes = _add_nodes(lattice, pupil, data, n_nodes, cells, level, depth, ny, box)
-        _trace(steps, lens, light, pupil, data, first, n_nodes)
-        children = np.empty(4 * cells.size, dtype=np.int64)
-        n_children = 0
-        height = ny << level
-        h = 1.0 / height
-        for cell in cells:
-            a, b = cell // height, cell % height
-            _cell_nodes(lattice, a, b, level, depth, nodes)
-            verdict = EMPTY
-            for v in range(data.shape[0]):
-                found = _classify(data[v], nodes, crossings, iris, level, h, limits, values)
-                if found % REASON == SPLIT:
+        begun[k, 0], begun[k, 1] = 0, k
+    beside_light = False
+    while n_begun > 0:
+        start, n_start = begun, n_begun
+        begun, n_begun = np.empty((64, 2), dtype=np.int64), 0
+        children, n_children = np.empty(0, dtype=np.int64), 0
+        for level in range(max_level + 1):
+            cells = _with_started(children, n_children, start, n_start, level)
+            n_children = 0
+            if cells.size == 0:
+                continue
+            if level > depth:
+                depth = level
+                lattice, state = _enlarged(lattice, state, offsets[depth + 1])
+            first = n_nodes
+            pupil, data, n_nodes = _add_nodes(lattice, pupil, data, n_nodes, cells, level, depth, ny, box)
+            _trace(steps, lens, light, pupil, data, first, n_nodes)
+            children = np.empty(4 * cells.size, dtype=np.int64)
+            height = ny << level
+            h = 1.0 / height
+            for cell in cells:
+                a, b = cell // height, cell % height
+                _cell_nodes(lattice, a, b, level, depth, nodes)
+                verdict = EMPTY
+                for v in range(data.shape[0]):
+                    found = _classify(data[v], nodes, crossings, iris, level, h, limits, values)
+                    if found % REASON == SPLIT:
+                        verdict = SPLIT
+                        halved[found // REASON] += 1
+                        break
+                    if found == LEAF or (found == FLAT and verdict == EMPTY):
+                        verdict = found
+                if (
+                    beside_light and verdict == EMPTY and level < max_level
+                    and has_lit_side(data, lattice, a, b, level, depth, crossings, iris[0], limits)
+                ):  # fmt: skip
                     verdict = SPLIT
-                    halved[found // REASON] += 1
-                    break
-                if found == LEAF or (found == FLAT and verdict == EMPTY):
-                    verdict = found
-            state[offsets[level] + cell] = verdict
-            if verdict == SPLIT:
-                for m in range(4):
-                    children[n_children] = (2 * a + m // 2) * (2 * height) + 2 * b + m % 2
-                    n_children += 1
-        cells = children[:n_children]
-        if n_children == 0:
-            break
+                    halved[NEAR_RIM] += 1
+                state[offsets[level] + cell] = verdict
+                if verdict == SPLIT:
+                    for m in range(4):
+                        children[n_children] = (2 * a + m // 2) * (2 * height) + 2 * b + m % 2
+                        n_children += 1
+            for cell in cells:
+                if state[offsets[level] + cell] == LEAF or state[offsets[level] + cell] == FLAT:
+                    begun, n_begun = halve_neighbours(
+                        state, offsets, data, lattice, cell, level, depth, nx, ny, crossings, iris[0], limits, begun,
+                        n_begun,
+                    )  # fmt: skip
+        halved[NEAR_RIM] += n_begun // 4
+        beside_light = True
     _balance(state, offsets, nx, ny, depth)
     first = n_nodes
     for level in range(1, depth + 1):
@@ -335,6 +354,23 @@ def build_mesh(steps, lens, light, crossings, iris, box, coarse, limits):
     _trace(steps, lens, light, pupil, data, first, n_nodes)
     pupil, data = _resized(pupil, data, n_nodes, n_nodes)
     return pupil, data, _triangulate(state, offsets, lattice, nx, ny, depth), halved
+
+
+@inner
+def _with_started(children, n_children, start, n_start, level):
+    """Return cells of a level and those that start at it."""
+    count = n_children
+    for k in range(n_start):
+        count += 1 if start[k, 0] == level else 0
+    cells = np.empty(count, dtype=np.int64)
+    for k in range(n_children):
+        cells[k] = children[k]
+    count = n_children
+    for k in range(n_start):
+        if start[k, 0] == level:
+            cells[count] = start[k, 1]
+            count += 1
+    return cells
 
 
 @inner

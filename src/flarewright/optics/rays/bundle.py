@@ -217,7 +217,7 @@ def trace_grid(
     # errors accumulate along the rim of the light, which can be a small part of the box
     rim_tolerance = fine.flux_tolerance * 2.0**fine.rough * sqrt(region.share)
     rim_level = 0 if fine.coarse else RIM_LEVEL - 1 if fine.rough else RIM_LEVEL
-    max_level = MAX_LEVEL + int(region.share < NARROW and not (region.slivers or fine.rough or fine.coarse))
+    max_level = MAX_LEVEL + int(region.share < NARROW and not (fine.rough or fine.coarse))
     limits = GridLimits(
         rim_level, max_level, fine.tolerance, rim_tolerance, fine.fringe_px, fine.faint_radius, fine.scale,
         fine.view_radius, int(region.slivers), INNER_BEND, AREA_RATIO, WEIGHT_BEND, FOLD_PX, AREA_PX,
