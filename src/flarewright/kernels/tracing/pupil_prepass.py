@@ -105,8 +105,8 @@ def find_box(steps, lens, light, crossings, iris_radius, view_radius, box, cells
     -----
     Hullin 2011, section 4.2, "Ray Bounding". A cell is kept unless one of its limits is exceeded at every corner by
     more than half its variation over the cell. If few cells are kept, cells whose limits change fast are searched with
-    a finer grid; if every ray ends, the cells whose rays end latest are searched. If that finds nothing, the mirror axis
-    is searched, where a spot lies that is not one of a pair.
+    a finer grid; if every ray ends, the cells whose rays end latest are searched. If that finds nothing, the mirror
+    axis is searched, where a spot lies that is not one of a pair.
 
     Gaps between neighbouring rays of which one ends, or both at different surfaces, are halved repeatedly: one surface
     blocks the rays on one side, another surface those on the other side, and both may pass a sliver in between. Close

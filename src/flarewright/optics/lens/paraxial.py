@@ -16,8 +16,7 @@ from ...errors import LensError
 from ...kernels.paraxial import ghosts
 from ...model import Lens, Medium, Stop, Surface
 from ...typing import Floats
-from .dispersion import D_LINE_NM as D_LINE_NM  # noqa: PLC0414 (`rays` imports it from here)
-from .dispersion import refractive_index
+from .dispersion import D_LINE_NM, refractive_index
 from .paths import LightPath, direct_path
 from .surface_shape import curvature_across
 

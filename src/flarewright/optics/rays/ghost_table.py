@@ -16,7 +16,8 @@ from ...kernels.raster.polygons import blank_plane, to_pixels
 from ...kernels.tracing.sequential import ALIVE, REL, STOP_X, WEIGHT, X, Y
 from ...model import CoatingChoice, Iris, Lens
 from ...typing import Floats, Indices, Mask
-from ..lens.paraxial import D_LINE_NM, FirstOrder, path_matrices
+from ..lens.dispersion import D_LINE_NM
+from ..lens.paraxial import FirstOrder, path_matrices
 from ..lens.paths import LightPath, direct_path, ghost_paths
 from ..pupil.iris import blade_edges
 from .bundle import Bundle, Incidence, Refinement, incidence, trace_bundle, trace_grid, trace_points

@@ -16,7 +16,8 @@ from ...model import AsLens, Coating, CoatingChoice, InTurn, Lens, PerRow, Prese
 from ...model.lens.coating import StandardName
 from ...typing import Floats
 from ..coatings.thin_film import film_stack, reflectance_table
-from ..lens.paraxial import D_LINE_NM, FirstOrder, gap_indices, vertex_positions
+from ..lens.dispersion import D_LINE_NM
+from ..lens.paraxial import FirstOrder, gap_indices, vertex_positions
 from ..lens.surface_shape import curvature_across, has_rotational_symmetry, seen_along, shape_table
 
 REFLECTANCE_SAMPLES = 1025

@@ -21,8 +21,8 @@ from ...model.project.light import Spectrum
 from ...typing import Floats, Indices
 from ..coatings.thin_film import film_stack, stack_reflectance
 from ..colour.spectrum import band_shares, cubics
-from ..lens.dispersion import refractive_index
-from ..lens.paraxial import D_LINE_NM, gap_indices
+from ..lens.dispersion import D_LINE_NM, refractive_index
+from ..lens.paraxial import gap_indices
 from ..lens.paths import LightPath
 from .pack import REFLECTANCE_SAMPLES, PackedLens, SensorMirror
 from .pupil_region import tracing_arguments

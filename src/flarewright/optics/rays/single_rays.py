@@ -7,7 +7,8 @@ import numpy as np
 from ...kernels.tracing.sequential import trace_hits
 from ...model import Lens
 from ...typing import Floats
-from ..lens.paraxial import D_LINE_NM, first_order, gap_indices, vertex_positions
+from ..lens.dispersion import D_LINE_NM
+from ..lens.paraxial import first_order, gap_indices, vertex_positions
 from ..lens.paths import direct_path, ghost_path, sensor_path
 from ..lens.surface_shape import shape_table
 
