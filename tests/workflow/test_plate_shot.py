@@ -13,12 +13,13 @@ from PIL import Image
 from flarewright import Camera, Light, Output, Project, Quality, shot
 from flarewright.errors import FlarewrightError
 from flarewright.io.images.exr import read_exr
-from flarewright.model import Holdout
+from flarewright.model import Holdout, ProjectCurve
 from flarewright.plates.settings import PlateSettings
 from flarewright.render.render import BLACK
 from flarewright.workflow.plates.plate_files import plate_frames
 from flarewright.workflow.plates.plate_frame import alike_lights
 from flarewright.workflow.plates.plate_sources import plate_shot, sources_file
+from flarewright.workflow.shot import shot_frames
 from flarewright.workflow.shot_frame import _draw
 
 SIZE = (64, 36)
@@ -183,6 +184,17 @@ def test_frames_of_mixed_sizes_and_gaps_are_refused(plates, tmp_path):
         FlarewrightError, match=r"p\.1002\.exr has 64x30 pixels, the first frame 64x36; give frames of one"
     ):
         plate_shot(settings(tmp_path, threshold=1.0), [1001, 1002])
+
+
+def test_frames_of_a_plate_outside_the_keys_of_the_project_are_not_drawn_in_silence(plates):
+    stopping = ProjectCurve(of="f_number", at_s=(0.0, 1.0 / 24.0), values=(5.6, 16.0))
+    moving = project(f_number=None, curves=(stopping,))
+    with pytest.raises(FlarewrightError, match=r"frames 1001-1003 lie outside the project's 1-2 .* --start 1001"):
+        shot_frames(moving, None, settings(plates))
+    begun = moving.replace(timeline=moving.timeline.replace(start=1001))
+    frames, remarks = shot_frames(begun, None, settings(plates))
+    assert frames == (1001, 1002, 1003)
+    assert remarks == ["frame 1003 lies outside the keys, 1001-1002: everything rests there"]
 
 
 def test_the_file_of_sources_is_read_again_and_a_foreign_one_is_kept(plates, tmp_path):

@@ -367,33 +367,32 @@ def shot_frames(
     ProjectError
         There are none, or all of them lie outside the time in which the project moves.
     """
-    if plate is not None:
+    if plate is None:
+        wanted = parsed_frames(frames)
+    else:
         from .plates.plate_files import plate_frames
 
-        plate = replace(plate, first=project.timeline.start)
-        return plate_frames(plate, parsed_frames(frames)), []
+        wanted = plate_frames(replace(plate, first=project.timeline.start), parsed_frames(frames))
     timeline, long_s = project.timeline, length_s(project)
     last = timeline.start + ceil(long_s * float(frame_rate(timeline.fps)) - 1e-6)
-    if frames is None:
+    if wanted is None:
         if is_still(project):
             raise ProjectError("nothing in the project moves, so it has no last frame; give the frames, such as 1-24")
         return tuple(range(timeline.start, last + 1)), []
-    numbers = parsed_frames(frames)
-    assert numbers is not None
     if is_still(project):
-        alike = "nothing in the project moves: all frames are alike"
-        return numbers, [alike] if len(numbers) > 1 and not _sequences(project) else []
-    outside = [frame for frame in numbers if not timeline.start <= frame <= last]
-    if len(outside) == len(numbers):
+        alike = plate is None and len(wanted) > 1 and not _sequences(project)
+        return wanted, ["nothing in the project moves: all frames are alike"] if alike else []
+    outside = [frame for frame in wanted if not timeline.start <= frame <= last]
+    if len(outside) == len(wanted):
         raise ProjectError(
-            f"frames {frames_text(numbers)[:80]} lie outside the project's {timeline.start}-{last} (frame "
+            f"frames {frames_text(wanted)[:80]} lie outside the project's {timeline.start}-{last} (frame "
             f"{timeline.start} is at 0 s, the last key at {long_s:g} s); give frames inside, or --start "
-            f"{numbers[0]}, the number of the frame at 0 s"
+            f"{wanted[0]}, the number of the frame at 0 s"
         )
     if not outside:
-        return numbers, []
+        return wanted, []
     which = f"frames {frames_text(outside)[:80]} lie" if len(outside) > 1 else f"frame {outside[0]} lies"
-    return numbers, [f"{which} outside the keys, {timeline.start}-{last}: everything rests there"]
+    return wanted, [f"{which} outside the keys, {timeline.start}-{last}: everything rests there"]
 
 
 def parsed_frames(frames: str | Sequence[int] | None) -> tuple[int, ...] | None:
