@@ -95,3 +95,17 @@ def test_the_command_prints_a_table_json_and_csv(tmp_path, capsys):
     assert "of ghost light" in capsys.readouterr().out
     assert run([*words, "--brightest", "3"]) == 2
     assert "leave it out" in capsys.readouterr().err
+
+
+def test_without_a_direct_image_no_ghost_is_called_the_brightest(capsys):
+    """Peaks are relative to the direct image, so at 60 degrees, where it is cut off, there are none to compare."""
+    words = ["ghosts", "heliar-tronnier", "--light", "60,0", "--sweep", "field=60"]
+    assert run([*words, "--json"]) == 0
+    surfaces = json.loads(capsys.readouterr().out)["surfaces"]
+    assert surfaces
+    assert {surface["brightest"] for surface in surfaces} == {None}
+    assert run(words) == 0
+    table = capsys.readouterr().out
+    point = next(line for line in table.splitlines() if "587.56" in line)
+    assert [cell.strip() for cell in point.split("│")[5:8]] == ["-", "-", "-"]
+    assert {line.split("│")[4].strip() for line in table.splitlines() if "%" in line and "│" in line} == {"-"}

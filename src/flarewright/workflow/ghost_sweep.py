@@ -48,8 +48,8 @@ class SurfaceGain:
         Flux of the ghosts that reflect there over the flux of all ghosts, both summed over the sweep.
     largest_part : float
         The same at the point of the sweep where it is largest.
-    brightest : str
-        Of these ghosts, the one with the largest peak irradiance at any point.
+    brightest : str or None
+        Of these ghosts, the one with the largest peak irradiance at any point; None where no point has a direct image.
     peak_irradiance : float
         That peak, as in `optics.rays.ghost_table.GhostRow`.
     """
@@ -57,7 +57,7 @@ class SurfaceGain:
     row: int
     part: float
     largest_part: float
-    brightest: str
+    brightest: str | None
     peak_irradiance: float
 
 
@@ -124,7 +124,8 @@ def surface_gains(points: Sequence[SweepPoint]) -> tuple[SurfaceGain, ...]:
     everything = sum(point.throughput_mm2 for point in points)
     light: dict[int, float] = {}
     largest: dict[int, float] = {}
-    peaks: dict[int, tuple[float, str]] = {}
+    # peaks of points without a direct image are 0 and cannot be compared
+    peaks: dict[int, tuple[float, str | None]] = {}
     for point in points:
         here: dict[int, float] = {}
         for ghost in point.table.ghosts:
@@ -133,7 +134,8 @@ def surface_gains(points: Sequence[SweepPoint]) -> tuple[SurfaceGain, ...]:
                 # the sensor is a mirror, too, but has no coating of the lens
                 if isinstance(row, int):
                     here[row] = here.get(row, 0.0) + ghost.throughput_mm2
-                    peaks[row] = max(peaks.get(row, (-1.0, "")), (ghost.peak_irradiance, ghost.name))
+                    if ghost.peak_irradiance > peaks.setdefault(row, (0.0, None))[0]:
+                        peaks[row] = (ghost.peak_irradiance, ghost.name)
         for row, flux in here.items():
             light[row] = light.get(row, 0.0) + flux
             part = flux / point.throughput_mm2 if point.throughput_mm2 > 0.0 else 0.0

@@ -137,7 +137,8 @@ def print_sweep(name: str, points: Sequence[SweepPoint], gains: Sequence[Surface
     for column in ("field degrees", "nm", "f/", "ghosts mm²", "of direct", "brightest", "its peak"):
         out.add_column(column, justify="right", no_wrap=True)
     for point in points:
-        peak = max(point.table.ghosts, key=lambda row: row.peak_irradiance, default=None)
+        compared = [row for row in point.table.ghosts if row.peak_irradiance > 0.0]
+        peak = max(compared, key=lambda row: row.peak_irradiance, default=None)
         direct = point.table.direct.throughput_mm2
         out.add_row(
             f"{point.field_deg[0]:z.3g}, {point.field_deg[1]:z.3g}", f"{point.wavelength_nm:g}",
@@ -154,6 +155,7 @@ def print_sweep(name: str, points: Sequence[SweepPoint], gains: Sequence[Surface
         ranked.add_column(column, justify="right", no_wrap=True)
     for gain in gains:
         ranked.add_row(
-            str(gain.row), f"{gain.part:.1%}", f"{gain.largest_part:.1%}", gain.brightest, f"{gain.peak_irradiance:.3g}"
-        )
+            str(gain.row), f"{gain.part:.1%}", f"{gain.largest_part:.1%}", gain.brightest or "-",
+            "-" if gain.brightest is None else f"{gain.peak_irradiance:.3g}",
+        )  # fmt: skip
     console().print(ranked)
