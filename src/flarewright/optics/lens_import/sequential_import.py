@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import atan, degrees
+from pathlib import Path
 
 from pydantic import ValidationError
 
@@ -22,6 +23,8 @@ from .configurations import Setting, positions_of
 IMAGE_OFF = 0.02
 # f-number of the draft lens before the real one is known
 TRIAL = 8.0
+# what states the f-number in a file, by suffix
+F_NUMBER_KEYS = {".zmx": "FNUM", ".seq": "FNO", ".len": "FNO", ".csv": "# f_number = ...", ".json": "its f-number"}
 
 
 def lens_of_sequence(raw: RawSequence) -> LensReading:
@@ -44,7 +47,7 @@ def lens_of_sequence(raw: RawSequence) -> LensReading:
     order = order_of(raw.file, draft)
     f_number = _f_number(raw, order, remarks)
     if not LEAST_F_NUMBER < f_number <= LARGEST_F_NUMBER:
-        raise LensError(f"{raw.file}: its f-number would be f/{f_number:.3g}, out of range for a lens: set FNUM")
+        raise LensError(f"{raw.file}: its f-number would be f/{f_number:.3g}, out of range for a lens: {_way_out(raw)}")
     _remark_image(kept[-1], order, remarks)
     rows = _within_spheres(rows, remarks)
     _remark_rims(kept, remarks)
@@ -152,13 +155,19 @@ def order_of(file: str, draft: Lens) -> FirstOrder:
         raise LensError(f"{file}: {str(error).removeprefix(f'{draft.name}: ')}") from None
 
 
+def _way_out(raw: RawSequence) -> str:
+    """Return the remedy for a file without a usable f-number, in the words of its format."""
+    key = F_NUMBER_KEYS.get(Path(raw.file).suffix.lower())
+    return "state the stop's diameter" if key is None else f"state {key} or the stop's semi-diameter"
+
+
 def _f_number(raw: RawSequence, order: FirstOrder, remarks: list[str]) -> float:
     if raw.f_number is not None:
         return raw.f_number
     if raw.entrance_pupil_diameter is not None:
         return order.efl / raw.entrance_pupil_diameter
     if raw.stop_semi_diameter is None:
-        raise LensError(f"{raw.file}: the aperture is not specified: set FNUM, ENPD or the stop's semi-diameter")
+        raise LensError(f"{raw.file}: the aperture is not specified: {_way_out(raw)}")
     found = TRIAL * order.stop_semi_diameter / raw.stop_semi_diameter
     remarks.append(f"the stop's semi-diameter of {raw.stop_semi_diameter:g} mm gives f/{found:.2f}")
     return found

@@ -141,3 +141,9 @@ def test_a_lens_of_pbrt(tmp_path):
 def test_faults_of_a_pbrt_table(tmp_path, text, said):
     with pytest.raises(LensError, match=said):
         opened(tmp_path, text, "lens.dat")
+
+
+def test_a_table_without_an_aperture_is_refused_in_the_words_of_its_format(tmp_path):
+    text = TABLE.replace("# f_number = 4\n", "").replace("5,stop,3.0,,,,5,,", "5,stop,3.0,,,,,,")
+    with pytest.raises(LensError, match=r"is not specified: state # f_number = \.\.\. or the stop's semi-diameter$"):
+        opened(tmp_path, text)

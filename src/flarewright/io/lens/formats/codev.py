@@ -199,8 +199,8 @@ def _sequence(path: Path, reading: _Reading, first_column: FirstColumn | None) -
     radii = first_column == "radii" if reading.radii is None else reading.radii
     if reading.radii is None and first_column is None:
         problems.append(
-            "the file has no RDM, so the first number of a surface can be its radius or its curvature: give "
-            "--first-column radii or curvatures, or add the line RDM Y or RDM N"
+            "the file has no RDM, so the first number of a surface can be its radius or its curvature: add the line "
+            "RDM Y or RDM N, or convert it with flarewright lens convert --first-column radii or curvatures"
         )
     unit = (reading.head.get("DIM") or ["M"])[0].upper()
     if unit not in _MM:
