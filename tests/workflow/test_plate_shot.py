@@ -159,6 +159,7 @@ def test_own_lights_stay_and_the_plates_lights_come_in_addition(plates, tmp_path
         ({"frames": "1001-1005"}, "lacks frames 1004-1005; there are 1001-1003: give --frames that exist"),
         ({"plate": PlateSettings("none.####.exr")}, "no file is named none.####.exr; check the folder"),
         ({"plate": PlateSettings("none.exr")}, "the plate none.exr does not exist"),
+        ({"plate": PlateSettings(".")}, "the plate . is a folder; give a picture, a film, or a sequence"),
         ({"threshold": 1e4}, "the plate has no source above 1e\\+04; lower --threshold or --stops"),
         ({"plate": None, "frames": "1"}, "a comp is laid over a plate, and there is none"),
         ({"camera": Camera(size_px=(64, 64))}, "the plate is 64x36 and the picture 64x64, of another shape"),

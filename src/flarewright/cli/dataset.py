@@ -130,7 +130,7 @@ def _draw(settings: DatasetSpec, output: Path, options: DatasetOptions) -> None:
     if options.as_json:
         print_json(_data(result, seconds))
         return
-    words = [f"drew {result.drawn} items in {seconds:.1f} s"] if result.drawn else []
+    words = [f"drew {result.drawn} item{'s'[: result.drawn != 1]} in {seconds:.1f} s"] if result.drawn else []
     words += [f"kept {result.kept} that the same specification made"] if result.kept else []
     words += [f"{number} {split}" for split, number in result.splits.items()]
     print_remarks([f"{result.folder}: {', '.join(words) or 'no item was to be drawn'}"])

@@ -52,7 +52,7 @@ PARALLEL_PX = 1_000_000
 PIXEL_BYTES = 12
 """Memory of a layer per pixel: three float32."""
 BLACK = "the picture is black: no light comes through the lens to the sensor"
-HIDDEN = "the picture is black: the holdout hides every light"
+HIDDEN = "the picture is black: a holdout or a depth plate hides every light"
 
 
 @dataclass(frozen=True)

@@ -119,6 +119,8 @@ def test_splits_share_out_lenses_and_every_split_has_one():
 def test_a_lens_that_cannot_be_used_is_named_before_the_work():
     with pytest.raises(ProjectError, match=r"lens.names: heliar-tronnier: .*preset"):
         check_lenses(spec_of(lens={"names": "heliar-tronnier", "coating": "preset:gold"}))
+    with pytest.raises(ProjectError, match=r"^lens.names: 'heliar' is neither a shipped lens nor a file"):
+        check_lenses(spec_of(lens={"names": ["heliar-tronnier", "heliar"]}))
 
 
 def test_stops_that_lead_beyond_the_largest_f_number_are_refused_before_the_work():

@@ -83,6 +83,10 @@ def _check_one_film(pattern: FramePattern) -> None:
 def _check_all_there(pattern: FramePattern, frames: Sequence[int], what: str) -> None:
     """Raise ProjectError with the missing frames of a sequence."""
     have = set(pattern.on_disk()) if pattern.numbered else None
+    if have is None and Path(pattern.text).is_dir():
+        raise ProjectError(
+            f"{what} {pattern.text} is a folder; give a picture, a film, or a sequence such as p.####.exr"
+        )
     if have is None and not Path(pattern.text).is_file():
         raise ProjectError(f"{what} {pattern.text} does not exist; check the path and the spelling")
     missing = [] if have is None else [frame for frame in frames if frame not in have]

@@ -279,7 +279,11 @@ def check_lenses(spec: DatasetSpec) -> None:
         names it.
     """
     for name in spec.lens.names.choice:
-        lens = open_lens(name).lens
+        try:
+            lens = open_lens(name).lens
+        except FlarewrightError as error:
+            # names the lens itself
+            raise ProjectError(f"lens.names: {error}", error.problems) from None
         lengths = zoom_range(lens)
         coatings = spec.lens.coating.choice
         focus = (None,) if spec.lens.focus_distance is None else spec.lens.focus_distance.support
