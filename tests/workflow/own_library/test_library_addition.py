@@ -128,6 +128,8 @@ def test_a_name_that_is_given_is_used_or_refused(files, state):
         add_lenses([files / "Petzval.lens"], name="mine")
     with pytest.raises(ProjectError, match=r"--name gives one lens its name, and .* holds 6 files"):
         add_lenses([files], name="mine")
+    with pytest.raises(ProjectError, match="and 2 places are given; add them one by one"):
+        add_lenses([files / "Triplet.csv", files / "Petzval.lens"], name="two")
 
 
 def test_additions_at_the_same_time_lose_nothing_and_add_nothing_twice(files, state):

@@ -129,10 +129,15 @@ def add_lenses(
     remarks: list[str] = []
     kinds: set[str] = set()
     names = _Names(folder)
+    if name is not None and len(places) > 1:
+        raise ProjectError(f"--name gives one lens its name, and {len(places)} places are given; add them one by one")
     for k, place in enumerate(places):
         with lens_files(place) as found:
-            if name is not None and (len(places) > 1 or len(found.files) != 1):
-                raise ProjectError(f"--name gives one lens its name, and {shown(place)} holds {len(found.files)} files")
+            if name is not None and len(found.files) != 1:
+                raise ProjectError(
+                    f"--name gives one lens its name, and {shown(place)} holds {len(found.files)} files; omit it, or "
+                    "give one file"
+                )
             for suffix, number in found.others.items():
                 others[suffix] = others.get(suffix, 0) + number
             kinds |= {file.suffix for file in found.files}

@@ -16,6 +16,7 @@ from flarewright.io.lens.own.search import Query, matching, parse_range
     [
         ("Zeiss Planar_50mm F/1,4 (1964)", "zeiss-planar-50mm-f-1.4-1964"),
         ("Voigtländer Heliar", "voigtlander-heliar"),
+        ("Weißgerber", "weissgerber"),
         ("../../etc/passwd", "etc-passwd"),
         ("...", "lens"),
         ("COM1", "lens-com1"),

@@ -91,7 +91,7 @@ def spoken(text: str) -> str:
     >>> spoken("Zeiss Planar_50mm F/1,4 (1964)")
     'zeiss-planar-50mm-f-1.4-1964'
     """
-    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().lower()
+    plain = unicodedata.normalize("NFKD", text.casefold()).encode("ascii", "ignore").decode().lower()
     plain = re.sub(r"(?<=\d)[.,](?=\d)", "\0", plain)
     plain = re.sub(r"[^a-z0-9\0]+", "-", plain).replace("\0", ".")
     plain = plain.strip("-.")
