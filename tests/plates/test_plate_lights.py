@@ -14,6 +14,7 @@ from flarewright.plates.detection import LUMINANCE, find_sources
 from flarewright.plates.field_map import field_map
 from flarewright.plates.joining import joined
 from flarewright.plates.lights import lights_at, plate_factor, plate_tracks
+from flarewright.plates.marked import light_rows
 from flarewright.plates.measured_plate import expanded
 from flarewright.plates.settings import PlateSettings, parse_source
 from flarewright.plates.tracking import follow
@@ -93,6 +94,10 @@ def test_points_discs_and_rectangles_keep_their_size(lens):
     assert disc.diameter_deg == pytest.approx(12 * degrees_px, rel=0.06)
     assert bar.shape.size_deg == (pytest.approx(25 * degrees_px, rel=0.06), pytest.approx(3 * degrees_px, rel=0.1))
     assert np.sin(np.radians(bar.shape.rotation_deg)) == pytest.approx(0.0, abs=0.01)
+    # the list states the sizes that are drawn: the moments of 25 x 3 px are those of this bar, of 6 px radius the disc's
+    sizes = {row["kind"]: (row["width"], row["height"]) for row in light_rows(tracks_of(pixels), 1)}
+    assert sizes["disc"] == pytest.approx((12.0, 12.0), rel=0.02)
+    assert sizes["rectangle"] == pytest.approx((25.0, 3.0), abs=1e-3)
     # points are faster
     far, _ = lights_at(tracks_of(pixels, point_px=1e3), 1, directions, factor, SIZE)
     assert not any(light.extended for light in far)

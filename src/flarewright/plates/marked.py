@@ -29,9 +29,9 @@ def light_rows(plate: PlateTracks, frame: int) -> list[dict[str, float | int | s
     sums = light.sum(axis=1)
     rows: list[dict[str, float | int | str]] = []
     for k in sorted(np.flatnonzero(sums > 0.0), key=lambda k: (-sums[k], k)):
-        sides, angle = _sides(tracks.moments_px2[k, at])
         kind = "point" if not plate.extended[k] else "disc" if plate.round[k] else "rectangle"
         kind = "joined" if k >= len(tracks) - plate.joined else kind
+        sides, angle = _disc(tracks.moments_px2[k, at]) if kind == "disc" else _sides(tracks.moments_px2[k, at])
         x, y = tracks.centre_px[k, at]
         r, g, b = light[k]
         rows.append(
@@ -43,6 +43,12 @@ def light_rows(plate: PlateTracks, frame: int) -> list[dict[str, float | int | s
             }
         )  # fmt: skip
     return rows
+
+
+def _disc(moments: Floats) -> tuple[Floats, float]:
+    """Return the diameter of the disc with second moments, twice, and no angle; as `lights.lights_at` draws it."""
+    xx, _, yy = moments
+    return np.full(2, 4.0 * np.sqrt(0.5 * (xx + yy))), 0.0
 
 
 def _sides(moments: Floats) -> tuple[Floats, float]:
