@@ -170,6 +170,7 @@ def test_the_header_has_the_standard_attributes_and_the_moment(whole):
     assert contents.metadata["frame"] == "4"
     assert '"field_deg": [0.0, 3.0]' in contents.metadata["lights"]
     assert '"intensity": 2.5' in contents.metadata["lights"]
+    assert '"spectrum": "d65"' in contents.metadata["lights"]
     assert "field_deg = [0.0, 3.0]" in contents.metadata["project"]
 
 

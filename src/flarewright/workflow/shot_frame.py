@@ -18,6 +18,7 @@ from ..io.images.exr_attributes import shot_attributes
 from ..io.images.half import half_scale
 from ..io.project.named_files import picture_files
 from ..io.project.project_text import project_text
+from ..io.project.spectrum_text import spectrum_text
 from ..jobs.frame_list import FramePattern
 from ..jobs.worker import WRITING
 from ..measure.replay.measured_project import is_measured, render_measured
@@ -308,7 +309,11 @@ def _write(plan: ShotPlan, frame: int, moments: tuple[Project, ...], rendering: 
     # the moment in the middle stands for the frame
     shown = moments[len(moments) // 2]
     project = rendering.project
-    lights = [{"field_deg": light.field_deg, "intensity": light.intensity} for light in shown.lights]
+    # a table of a spectrum has no short text
+    lights = [
+        {"field_deg": light.field_deg, "intensity": light.intensity, "spectrum": spectrum_text(light.spectrum)}
+        for light in shown.lights
+    ]
     metadata = {
         "version": __version__,
         "project": project_text(shown),
