@@ -209,7 +209,13 @@ def _pictures(
     """Yield the moments and the codes of frames, of which some come before them."""
     deep = FILM_CODECS[film.output.suffix.lower()].deep
     for k, frame in enumerate(frames):
-        picture = read_plate(film.pattern.path(frame), layer=film.layer)
+        path = film.pattern.path(frame)
+        picture = read_plate(path, layer=film.layer)
+        if (size := picture.size_px) != film.size_px:
+            raise ProjectError(
+                f"{path} has {size[0]}x{size[1]} pixels, the first frame {film.size_px[0]}x{film.size_px[1]}; give "
+                "frames of one size"
+            )
         yield frame - frames[0], shown(picture, film.look, deep=deep)
         if report is not None:
             report(frame, before + k + 1, len(film.frames))
