@@ -94,7 +94,7 @@ def test_points_discs_and_rectangles_keep_their_size(lens):
     assert disc.diameter_deg == pytest.approx(12 * degrees_px, rel=0.06)
     assert bar.shape.size_deg == (pytest.approx(25 * degrees_px, rel=0.06), pytest.approx(3 * degrees_px, rel=0.1))
     assert np.sin(np.radians(bar.shape.rotation_deg)) == pytest.approx(0.0, abs=0.01)
-    # the list states the sizes that are drawn: the moments of 25 x 3 px are those of this bar, of 6 px radius the disc's
+    # the list states the sizes that are drawn
     sizes = {row["kind"]: (row["width"], row["height"]) for row in light_rows(tracks_of(pixels), 1)}
     assert sizes["disc"] == pytest.approx((12.0, 12.0), rel=0.02)
     assert sizes["rectangle"] == pytest.approx((25.0, 3.0), abs=1e-3)

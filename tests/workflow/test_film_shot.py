@@ -222,6 +222,8 @@ def test_a_film_lacks_no_frame(tmp_path, frames, words):
 def test_a_frame_of_another_size_is_named(tmp_path):
     for frame, width in ((1, 64), (2, 48)):
         Image.new("RGB", (width, 36)).save(tmp_path / f"p.{frame}.png")
-    with pytest.raises(FlarewrightError, match=r"p\.2\.png has 48x36 pixels, the first frame 64x36; give frames of one"):
+    with pytest.raises(
+        FlarewrightError, match=r"p\.2\.png has 48x36 pixels, the first frame 64x36; give frames of one"
+    ):
         assemble_film(tmp_path / "p.#.png", tmp_path / "p.mp4")
     assert not (tmp_path / "p.mp4").exists()

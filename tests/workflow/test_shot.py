@@ -230,6 +230,11 @@ def test_a_blurred_frame_chooses_the_brightest_ghosts_of_the_mean(tmp_path):
     [
         ({"frames": "100-120"}, r"frames 100-120 lie outside the project's 1-7 .* --start 100"),
         ({"frames": []}, "is empty"),
+        ({"frames": [1, 1.5]}, r"frames are whole numbers, not \[1, 1.5\]"),
+        ({"parts": "many"}, "parts 'many' is unknown; choose multi or single"),
+        ({"movie": "f.mp4", "movie_view": "foo"}, "the view 'foo' is unknown; choose filmic, srgb, aces, rec709"),
+        ({"processes": 0}, "0 processes are not possible; give 1 or more"),
+        ({"threads": -1}, "-1 threads are not possible; give 1 or more"),
         ({"output": "a.exr"}, "all 7 frames would go to a.exr"),
         ({"output": "f.####.png"}, r"must be named \*\.exr"),
         ({"output": "missing/f.####.exr"}, "the folder .*missing does not exist; create it first"),

@@ -6,8 +6,9 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
+from operator import index
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 from ..errors import FlarewrightError, OutputError, ProjectError
 from ..jobs.cluster.executor import open_cluster, workers_of
@@ -162,7 +163,7 @@ def shot(
     from ..render.image.ocio_space import check_file_space, has_film_primaries
     from .shot_frame import ShotPlan
 
-    _check(shutter_deg, subframes)
+    _check(shutter_deg, subframes, parts)
     if radiance and (plate is not None or project.lit_by_plate):
         raise ProjectError("layers over a plate have its unit already; omit --radiance")
     of_space = check_file_space(project)
@@ -185,7 +186,7 @@ def shot(
     _check_output(pattern)
     comp = _comp_pattern(over, plate, project, numbers)
     if movie is not None:
-        _check_movie(movie, FramePattern(comp or pattern.text), chunk)
+        _check_movie(movie, FramePattern(comp or pattern.text), chunk, movie_view)
     written = [pattern.text, comp, "" if movie is None else os.fspath(movie)]
     _keep_sequences(project, plate, [FramePattern(name) for name in written if name], numbers)
     mine = numbers if chunk is None else chunk_of(numbers, *parse_chunk(chunk))
@@ -270,11 +271,14 @@ def _comp_pattern(
     return pattern.text
 
 
-def _check_movie(movie: str | os.PathLike[str], output: FramePattern, chunk: str | None) -> None:
+def _check_movie(movie: str | os.PathLike[str], output: FramePattern, chunk: str | None, view: FilmView | None) -> None:
     """Raise an error before the work if the film cannot be made of the frames."""
     from .films.assembly import check_film
+    from .films.look import FilmView
 
     check_film(movie)
+    if view is not None and view not in get_args(FilmView):
+        raise ProjectError(f"the view {view!r} is unknown; choose {', '.join(get_args(FilmView))}")
     if chunk is not None:
         raise ProjectError(
             f"a film needs all frames, and chunk {chunk} draws some; draw all chunks without a film, then: flarewright "
@@ -405,7 +409,13 @@ def parsed_frames(frames: str | Sequence[int] | None) -> tuple[int, ...] | None:
     """
     if frames is None:
         return None
-    numbers = parse_frames(frames) if isinstance(frames, str) else tuple(sorted(set(frames)))
+    try:
+        # NumPy's whole numbers, too
+        numbers = parse_frames(frames) if isinstance(frames, str) else tuple(sorted({index(frame) for frame in frames}))
+    except TypeError:
+        raise ProjectError(
+            f"frames are whole numbers, not {list(frames)!r:.80}; write for example range(1, 25)"
+        ) from None
     if not numbers:
         raise ProjectError("the list of frames is empty; give at least one, such as 1-24")
     return numbers
@@ -426,11 +436,13 @@ def _remarks(done: Sequence[FrameResult]) -> list[str]:
     return [*found[:_MOST_REMARKS], f"and {more} more remarks on single frames"] if more > 0 else found
 
 
-def _check(shutter_deg: float, subframes: int | None) -> None:
+def _check(shutter_deg: float, subframes: int | None, parts: str) -> None:
     if not 0.0 <= shutter_deg <= 360.0:
         raise ProjectError(f"a shutter of {shutter_deg:g} degrees does not exist; give 0 to 360, 180 is usual")
     if subframes is not None and not 1 <= subframes <= 1000:
         raise ProjectError(f"{subframes} sub-frames are not possible; give 1 to 1000")
+    if parts not in ("multi", "single"):
+        raise ProjectError(f"parts {parts!r} is unknown; choose multi or single")
 
 
 def _check_output(pattern: FramePattern) -> None:

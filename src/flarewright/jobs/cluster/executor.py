@@ -224,13 +224,16 @@ def workers_of(cluster: str | None, processes: int | None, threads: int | None) 
     Raises
     ------
     ProjectError
-        They contradict each other.
+        They contradict each other, or are below 1.
 
     Examples
     --------
     >>> workers_of("local:4", None, None), workers_of(None, 2, None)
     (4, 2)
     """
+    for what, number in (("processes", processes), ("threads", threads)):
+        if number is not None and number < 1:
+            raise ProjectError(f"{number} {what} are not possible; give 1 or more, or None for one per core")
     if cluster is None:
         return processes
     choice = parse_cluster(cluster)
