@@ -120,11 +120,13 @@ def test_a_frame_does_not_replace_a_file_that_the_shot_reads(place, capsys):
 def test_render_draws_a_frame_or_a_moment_and_says_which(place, capsys):
     plain = ["render", "--project", "p.toml", "--no-png", "-o"]
     assert run([*plain, "a.exr", "--frame", "1004"]) == 0
-    assert "frame 1004, 0.125 s (24 frames per second) is drawn" in capsys.readouterr().err
+    assert "frame 1004, 0.125 s (24 frames per second) is drawn\n" in capsys.readouterr().err
     assert run([*plain, "b.exr", "--time", "0.125"]) == 0
     assert "the moment 0.125 s is drawn" in capsys.readouterr().err
     assert (place / "a.exr").read_bytes() == (place / "b.exr").read_bytes()
     assert "field_deg = [0.0, 3.0]" in read_exr(place / "a.exr").metadata["project"]
+    assert run([*plain, "c.exr", "--frame", "1099"]) == 0
+    assert "is drawn; everything rests after the last key at 0.25 s\n" in capsys.readouterr().err
     assert run([*plain, "c.exr"]) == 0
     said = capsys.readouterr().err
     assert "one frame is drawn, with the plain values of the project; keys of light 0, f_number are left out" in said

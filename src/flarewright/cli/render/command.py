@@ -185,7 +185,7 @@ def _check_places(options: RenderOptions, timeline: dict[str, Any] | None) -> No
 def _at_moment(project: Project, options: RenderOptions) -> tuple[Project, str]:
     """Return the project of --frame or --time, and a remark that names the moment."""
     from ...model.project.animation import LAST_S
-    from ...workflow.keyframes import is_still, project_at, still, time_of
+    from ...workflow.keyframes import is_still, length_s, project_at, still, time_of
 
     if options.frame is not None and options.at_s is not None:
         raise ProjectError("--frame and --time both choose the moment; keep one")
@@ -205,7 +205,10 @@ def _at_moment(project: Project, options: RenderOptions) -> tuple[Project, str]:
             f"{flag}: {at_s:g} s lies outside the time of a project, 0 to {LAST_S:g} s; the frame at 0 s is "
             f"{project.timeline.start}"
         )
-    return still(project_at(project, at_s)), f"{words} is drawn"
+    last_s = length_s(project)
+    # times of frames are rounded
+    rests = f"; everything rests after the last key at {last_s:g} s" if at_s > last_s + 1e-6 else ""
+    return still(project_at(project, at_s)), f"{words} is drawn{rests}"
 
 
 def _without_effect(options: RenderOptions, settings: Project) -> list[str]:
