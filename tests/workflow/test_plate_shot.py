@@ -176,6 +176,13 @@ def test_what_cannot_be_drawn_is_refused_in_one_sentence(plates, tmp_path, chang
     assert not list(tmp_path.glob("*.exr"))
 
 
+def test_a_comp_has_the_pixel_aspect_of_its_plate(tmp_path):
+    OpenEXR.File({"pixelAspectRatio": 2.0}, {"RGB": picture()}).write(str(tmp_path / "p.1001.exr"))
+    draw(tmp_path, tmp_path, frames=[1001])
+    aspects = [read_exr(tmp_path / f"{name}.1001.exr").header["pixelAspectRatio"] for name in "fc"]
+    assert aspects == [1.0, 2.0]
+
+
 def test_frames_of_mixed_sizes_and_gaps_are_refused(plates, tmp_path):
     for k in (0, 1, 3):
         write(tmp_path / f"p.{1001 + k}.exr", picture(k)[: 36 if k < 1 else 30])

@@ -228,7 +228,8 @@ def write_comp(
         pixel_type=project.output.pixel_type,
         scale=1.0,
         metadata={**metadata, "plate": json.dumps(facts)},
-        pixel_aspect=project.camera.pixel_aspect,
+        # the comp has the pixels of the plate; few files state those of an anamorphic lens
+        pixel_aspect=project.camera.pixel_aspect if plate.pixel_aspect == 1.0 else plate.pixel_aspect,
         colorspace=space,
         compression=project.output.compression,
         attributes={**attributes, **(picture.header or {})},
