@@ -94,7 +94,8 @@ def test_a_lens_alone_is_drawn_as_photographed(place, capsys):
         ("-o f.#.tif", "must be named *.exr"),
         ("--chunk 3/2 -o f.#.exr", "chunk 3/2 does not exist"),
         ("--parts many -o f.#.exr", "choose multi or single"),
-        ("--fps 0 -o f.#.exr", "timeline.fps"),
+        ("--fps 0 -o f.#.exr", "--fps should be greater than or equal to 0.01, not 0"),
+        ("--compression foo -o f.#.exr", "--compression should be 'zip' or 'dwaa', not 'foo'"),
         ("--shutter 400 -o f.#.exr", "give 0 to 360"),
     ],
 )

@@ -46,7 +46,7 @@ _OPTION_OF = {
     "starburst.cats_eye": "cats_eye", "starburst.size": "starburst_size", "starburst.spiral_deg": "starburst_spiral",
     "output.layers": "layers", "output.brightest": "brightest", "output.gamut": "gamut",
     "output.compression": "compression", "output.starburst": "no_starburst", "output.matte": "matte",
-    "output.matte_ranks": "matte_ranks",
+    "output.matte_ranks": "matte_ranks", "timeline.fps": "fps", "timeline.start": "start",
     "output.colorspace": "colorspace", "output.ocio_space": "colorspace", "output.ocio_config": "ocio",
 }  # fmt: skip
 # sections that options set key by key; `space_flags` has three keys of the output
@@ -198,8 +198,10 @@ def _given(flags: RenderOptions, section: str) -> dict[str, Any]:
     """Return the settings of a section that the flags set, by key."""
     found: dict[str, Any] = {}
     for key, option in _OPTION_OF.items():
+        if not key.startswith(f"{section}.") or key in _OF_SPACE:
+            continue
         value = getattr(flags, option)
-        if key.startswith(f"{section}.") and key not in _OF_SPACE and value is not None and value is not False:
+        if value is not None and value is not False:
             found[key.partition(".")[2]] = _READERS[key](value) if key in _READERS else value
     if section == "output" and (flags.half or flags.float32):
         found["pixel_type"] = "half" if flags.half else "float"
