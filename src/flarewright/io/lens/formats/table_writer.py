@@ -91,7 +91,7 @@ def dotlens_text(lens: Lens, focal_length: float, sensor_distance: float, stop_s
     _refuse_toroids(lens, ".lens")
     for k, row in enumerate(lens.rows):
         if isinstance(row, Surface) and (row.conic or row.terms):
-            raise LensError(f"row {k} is no sphere, and .lens tables hold spheres only; write a .zmx or .csv file")
+            raise LensError(f"row {k} is no sphere, and .lens tables hold spheres only; write a .zmx or .toml file")
     name = " ".join(lens.name.replace("#", " ").split())
     glass = sum(isinstance(row, Surface) and row.medium is not None for row in lens.rows)
     lines = [
@@ -120,4 +120,7 @@ def _radius(curvature: float, flat: str = "flat") -> str:
 def _refuse_toroids(lens: Lens, kind: str) -> None:
     for k, row in enumerate(lens.rows):
         if isinstance(row, Surface) and row.toroidal:
-            raise LensError(f"row {k} has different curvatures in its meridians, which a {kind} file cannot hold")
+            raise LensError(
+                f"row {k} has different curvatures in its meridians, which a {kind} file cannot hold; write a .zmx or "
+                ".toml file"
+            )
