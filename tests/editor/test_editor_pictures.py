@@ -925,6 +925,37 @@ def test_undo_leads_back_to_the_exposure_of_the_lens_before():
     session.writer.close()
 
 
+@pytest.mark.usefixtures("screen_size")
+def test_a_look_is_exposed_anew_and_undone_with_its_exposure():
+    """A look kept the exposure of the previous one: five stops over, or eight under, which is black."""
+    session, _ = begin(None)
+    screen = Screen(session, sharpen)
+    screen.start()
+    assert screen.wait(60.0)
+    held = screen.exposure_stops
+    session.do("put_look", {"name": "warm-vintage"})
+    assert screen.wait(60.0)
+    worn = screen.exposure_stops
+    assert worn == session.view.found_stops == render_picture.exposure_of(screen.picture)
+    assert abs(worn - held) > 1.0
+    # edits keep the exposure of the look
+    session.do("set_coating", {"text": "none"})
+    assert screen.wait(60.0)
+    assert screen.exposure_stops == worn
+    session.undo()
+    session.undo()
+    assert screen.wait(60.0)
+    assert screen.exposure_stops == held
+    session.redo()
+    assert screen.wait(60.0)
+    assert screen.exposure_stops == worn
+    # another project of the same lens has its own exposure too
+    session.put(session.project.replace(f_number=16.0, lights=(Light(field_deg=(1.0, 6.0)),)), "Open", begins=True)
+    assert screen.wait(60.0)
+    assert screen.exposure_stops == render_picture.exposure_of(screen.picture)
+    session.writer.close()
+
+
 def test_pictures_have_the_size_that_a_page_has_room_for(project):
     def size(room, **camera):
         return render_picture.rest_size(project.replace(camera=Camera(**camera)), room)

@@ -83,13 +83,16 @@ def _brighten(screen: Screen, project: Project, view: View) -> None:
 
 
 def _sharpen(screen: Screen, shown: DrawnPicture | None, project: Project, view: View, check: Check) -> None:
-    # another lens gets a new exposure; edits of a lens keep it, so that brightness can be compared
+    # another lens, project or look gets a new exposure; edits keep it, so that brightness can be compared
     if shown is None and view.found_stops is not None:
         screen.match = Match(exposure_stops=view.found_stops)
-    other = shown is not None and render_picture.lens_name(shown.project) != render_picture.lens_name(project)
+    exposures = screen.exposures_of(project)
+    other = shown is not None and (
+        exposures != screen.exposures_at or render_picture.lens_name(shown.project) != render_picture.lens_name(project)
+    )
     known = screen.known_exposure(render_picture.pictured(project)) if other else None
     fresh = known is None and (other or not screen.exposed or (shown is None and view.found_stops is None))
-    changed = shown is None or not render_picture.same_scene(shown.project, project)
+    changed = shown is None or other or not render_picture.same_scene(shown.project, project)
     working = view.grey or view.unclipped
     followed = screen.moved is not None and render_picture.same_scene(screen.moved, project)
     draft: DrawnPicture | None = None
@@ -114,6 +117,7 @@ def _sharpen(screen: Screen, shown: DrawnPicture | None, project: Project, view:
         if draft.grey and (fresh or shown is None or not shown.grey):
             stops = render_picture.exposure_of(draft, Match()) - screen.match.exposure_stops
             screen.match = replace(screen.match, grey=2.0**stops)
+        screen.exposures_at = exposures
         screen.show(draft)
     seen_first = not working and screen.final_s > GHOSTS_FIRST_S
     if not working:

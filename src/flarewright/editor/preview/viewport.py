@@ -29,7 +29,7 @@ from .plate_view import comp_of, is_lit, plate_for, plate_under
 
 # JPEG quality of a picture at rest
 QUALITY = 92
-# number of exposures kept of earlier lenses
+# number of exposures kept of earlier lenses and looks
 MOST_EXPOSURES = 30
 # a drag that pauses for so long gets a traced picture, seconds
 HOLD_S = 0.15
@@ -55,8 +55,10 @@ class Screen:
         self.picture: DrawnPicture | None = None
         self.seen: PickableGhosts | None = None
         self.match = Match()
-        # exposures of earlier lenses, restored when undo returns to them
+        # exposures of earlier lenses and looks, restored when undo returns to them
         self.exposures: list[tuple[Project, float]] = []
+        # value of `session.exposures` for which the exposure of the shown picture was determined
+        self.exposures_at = session.exposures
         # False until the lens has shown a ghost for determining its exposure
         self.exposed = True
         self.problem = ""
@@ -158,9 +160,15 @@ class Screen:
         return self.match.exposure_stops if own is None else own
 
     def leave(self, project: Project) -> None:
-        """Store the exposure of a lens that is replaced by another."""
+        """Store the exposure of a lens or look that is replaced by another."""
         kept = [each for each in self.exposures if each[0] != project][1 - MOST_EXPOSURES :]
         self.exposures = [*kept, (project, self.match.exposure_stops)]
+
+    def exposures_of(self, project: Project) -> int:
+        """Return the session's count of exposures for its present project; that of the shown picture for others."""
+        # the session may have moved on, or a drag shows a project that it does not have yet
+        with self.session.lock:
+            return self.session.exposures if self.session.project == project else self.exposures_at
 
     def known_exposure(self, project: Project) -> float | None:
         """Return the stored exposure of an earlier project; None if there is none."""

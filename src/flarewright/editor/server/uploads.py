@@ -59,7 +59,7 @@ def take_in(session: Session, name: str, data: bytes, use: str = "", light: int 
         session.put(found.project, f"Import {name}", begins=True)
     elif found.look is not None:
         changed, remarks = with_look(session.project, found.look)
-        session.put(changed, f"Look {found.look.name}")
+        session.put(changed, f"Look {found.look.name}", look=True)
         return remarks
     elif found.lens is not None:
         session.put(choose_lens(session.project, found.lens), f"Import {name}")

@@ -71,7 +71,7 @@ def write_autosave(path: Path, saved: Saved) -> None:
         "view": saved.view.model_dump(mode="json"),
         "moments": [
             {
-                "label": m.label, "group": m.group, "file": m.file, "begins": m.begins,
+                "label": m.label, "group": m.group, "file": m.file, "begins": m.begins, "look": m.look,
                 "project": m.project.model_dump(mode="json"),
             }
             for m in moments
@@ -98,7 +98,8 @@ def read_autosave(path: Path) -> Saved | None:
             for m in data["moments"]
         )
         moments = tuple(
-            replace(one, begins=bool(m.get("begins"))) for one, m in zip(moments, data["moments"], strict=True)
+            replace(one, begins=bool(m.get("begins")), look=bool(m.get("look")))
+            for one, m in zip(moments, data["moments"], strict=True)
         )
         at = int(data["at"])
         if not 0 <= at < len(moments):

@@ -24,6 +24,8 @@ class Moment:
         Project file of this state.
     begins : bool
         Whether this state opened another project instead of editing the previous one.
+    look : bool
+        Whether a look was applied, which can change the brightness by many stops.
     """
 
     project: Project
@@ -31,6 +33,7 @@ class Moment:
     group: str = ""
     file: str | None = None
     begins: bool = False
+    look: bool = False
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,14 @@ def started(project: Project, label: str = "Open", file: str | None = None) -> H
 
 
 def committed(
-    history: History, project: Project, label: str, group: str = "", *, file: str | None = None, begins: bool = False
+    history: History,
+    project: Project,
+    label: str,
+    group: str = "",
+    *,
+    file: str | None = None,
+    begins: bool = False,
+    look: bool = False,
 ) -> History:
     """Add a project; undone states are dropped.
 
@@ -80,8 +90,8 @@ def committed(
         If it equals that of the present state, which is the last one, the new project replaces that state.
     file : str or None
         Project file of the new state.
-    begins : bool
-        As in `Moment.begins`.
+    begins, look : bool
+        As in `Moment`.
 
     Returns
     -------
@@ -94,7 +104,7 @@ def committed(
     kept = history.moments[: history.at + 1]
     if group and group == last.group and history.at > 0 and history.at + 1 == len(history.moments):
         kept = kept[:-1]
-    moments = (*kept, Moment(project, label, group, file, begins))[-MOST:]
+    moments = (*kept, Moment(project, label, group, file, begins, look))[-MOST:]
     return History(moments, len(moments) - 1)
 
 
@@ -149,6 +159,12 @@ def _has_new(design: Design) -> bool:
 def first_entry(history: History) -> Moment | None:
     """Return the state that opened the present project; None if it is not in the history."""
     return next((moment for moment in reversed(history.moments[: history.at + 1]) if moment.begins), None)
+
+
+def exposed_entry(history: History) -> Moment | None:
+    """Return the state that opened the present project or applied its last look; None if it is not in the history."""
+    own = (moment for moment in reversed(history.moments[: history.at + 1]) if moment.begins or moment.look)
+    return next(own, None)
 
 
 def filed(history: History, file: str | None) -> History:

@@ -46,6 +46,8 @@ class Session:
         self.revision = 0
         # incremented when another project replaces the present one
         self.opened = 0
+        # incremented when another project or look replaces the present one
+        self.exposures = 0
         self.listeners: list[Listener] = []
         # files that the page may name
         self.reach = Reach()
@@ -96,16 +98,30 @@ class Session:
             project, label = done(self.project, name, values)
             project = _on_plate(self.project, project)
             self.reach.check_project(project, self.project)
-            self._move(past.committed(self.history, project, label, group, file=self.file))
+            self._move(past.committed(self.history, project, label, group, file=self.file, look=name == "put_look"))
             return "" if group else correction(name, values, project)
 
-    def put(self, project: Project, label: str, *, begins: bool = False, placed: bool = False) -> None:
-        """Add a project to the history; `begins`: it is another project, not an edit; `placed`: so are its lights."""
+    def put(
+        self, project: Project, label: str, *, begins: bool = False, placed: bool = False, look: bool = False
+    ) -> None:
+        """Add a project to the history.
+
+        Parameters
+        ----------
+        project : Project
+        label : str
+        begins : bool
+            It is another project, not an edit.
+        placed : bool
+            So are its lights.
+        look : bool
+            It is the present project with another look.
+        """
         with self.lock:
             if not begins and not placed:
                 project = _on_plate(self.project, project)
             self.reach.check_project(project, self.project)
-            self._move(past.committed(self.history, project, label, file=self.file, begins=begins))
+            self._move(past.committed(self.history, project, label, file=self.file, begins=begins, look=look))
 
     def _check_lens(self, name: str, values: dict[str, Any]) -> None:
         """Check the path of a lens before it is read."""
@@ -215,6 +231,7 @@ class Session:
     def _move(self, history: past.History) -> None:
         if history is not self.history and history != self.history:
             self.opened += past.first_entry(history) is not past.first_entry(self.history)
+            self.exposures += past.exposed_entry(history) is not past.exposed_entry(self.history)
             self.history = history
             self._changed()
 
