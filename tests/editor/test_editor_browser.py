@@ -530,6 +530,37 @@ def test_looks_are_put_on_by_a_click_and_saved_and_dropped(tab, tmp_path):
     assert tab.state()["lights"][0]["spectrum"] == worn["lights"][0]["spectrum"]
 
 
+def test_the_library_says_that_it_is_read_and_names_keep_their_letters(tab, tmp_path):
+    """Lenses and looks used to be an empty page under the heading Looks, for ever if they could not be read."""
+    words = "document.querySelector('#page').innerText.replace(/\\s+/g, ' ').trim()"
+    tab.page.route("**/api/library", lambda route: route.abort())
+    tab.tab("library")
+    tab.until("document.querySelector('#page').innerText.includes('editor')")
+    assert "Looks" not in tab.js(words)
+    tab.said.clear()
+    held = []
+    tab.page.unroute("**/api/library")
+    tab.page.route("**/api/library", lambda route: held.append(route))
+    tab.page.reload()
+    tab.rest()
+    tab.tab("library")
+    tab.until("document.querySelector('#page').innerText.includes('Reading the library')")
+    assert "Looks" not in tab.js(words)
+    for route in held:
+        route.continue_()
+    tab.until("document.querySelectorAll('[data-look]').length > 5")
+    assert "Reading" not in tab.js(words)
+    # names of files are not capitalised in messages
+    (tmp_path / "lo ok.toml").write_text("lens = 3\n")
+    tab.page.keyboard.press("Escape")
+    for path, wanted in ((tmp_path / "lo ok.toml", "lo ok.toml"), ("/etc/passwd", "passwd' is outside")):
+        tab.page.click("text=Open")
+        tab.page.fill("dialog input[name=path]", str(path))
+        tab.page.keyboard.press("Enter")
+        tab.until(f"document.querySelector('dialog')?.innerText.includes({wanted!r})", 20.0)
+        tab.page.keyboard.press("Escape")
+
+
 def test_the_library_and_the_keys(tab):
     tab.tab("library")
     tab.until("document.querySelectorAll('.library button').length > 10")

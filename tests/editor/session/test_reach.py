@@ -88,6 +88,9 @@ def test_a_misspelt_lens_is_reported_as_one(session, tmp_path, monkeypatch):
         (tmp_path / "takumer").write_text("")
     with pytest.raises(ProjectError, match=OUTSIDE):
         session.open("takumer.toml")
+    # quoted, so that no page takes the name for the first word of a sentence and capitalises it
+    with pytest.raises(ProjectError, match="'passwd' is outside"):
+        session.open("/etc/passwd")
 
 
 def test_a_project_may_not_lead_out_of_the_folders(session, tmp_path):

@@ -1,5 +1,5 @@
 // The user's lenses, the shipped lenses and the looks, each with a picture.
-import { get } from './api.js';
+import { get, inWords } from './api.js';
 import { h } from './ui.js';
 
 export function libraryPanel(app) {
@@ -9,7 +9,8 @@ export function libraryPanel(app) {
   const lensGrid = h('div', { class: 'library' });
   const lookGrid = h('div', { class: 'library', id: 'looks' });
   const heading = h('h3', { class: 'quietly', style: 'margin:8px 14px 0', tip: 'A look sets coatings, iris, dirt and colours of the present lens and lights. Undo reverts it.' }, 'Looks');
-  const reported = h('p', { class: 'quietly' });
+  const reported = h('p', { class: 'quietly' }, 'Reading the library…');
+  heading.hidden = true;
   box.addEventListener('input', draw);
   async function choose(name) { try { await app.command('choose_lens', { lens: name }); } catch (error) { void error; } }
   async function wear(name) { try { await app.command('put_look', { name }); } catch (error) { void error; } }
@@ -33,7 +34,7 @@ export function libraryPanel(app) {
   }
   return {
     element: h('div', {}, h('div', { class: 'group' }, box, reported), lensGrid, heading, lookGrid),
-    async shown() { try { const known = JSON.stringify(lenses); ({ lenses, looks } = await get('api/library')); if (JSON.stringify(lenses) !== known) draw(); } catch (error) { void error; } },
+    async shown() { try { const known = JSON.stringify(lenses); ({ lenses, looks } = await get('api/library')); if (JSON.stringify(lenses) !== known) draw(); } catch (error) { if (!lenses) reported.textContent = inWords(error); } },
     update(state) { for (const each of lensGrid.children) each.classList.toggle('on', each.dataset.lens === state.lens.shipped); },
   };
 }
