@@ -48,8 +48,8 @@ class Reach:
         if found in self.files or any(found.is_relative_to(root) for root in self.roots):
             return
         raise ProjectError(
-            f"{Path(path).name!r:.120} is outside the folders of this editor; start it with --root {found.parent!s:.120} "
-            "or put the file into one of them"
+            f"{Path(path).name!r:.120} is outside the folders of this editor; start it with --root "
+            f"{found.parent!s:.120} or put the file into one of them"
         )
 
     def check_name(self, text: str) -> None:
