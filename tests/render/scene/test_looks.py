@@ -116,3 +116,14 @@ def test_a_bare_coating_in_turn_is_bare():
     project = rich().replace(coating=PerRow(coatings=(None,) * len(load_lens(TESSAR).rows)), iris=Iris(blades=5))
     after, _ = with_look(shot(), look_of(project, "x")[0])
     assert set(after.coating.coatings) == {Bare()}
+
+
+def test_a_look_can_be_given_by_name_or_file(tmp_path):
+    """A name used to end in an AttributeError."""
+    assert with_look(shot(), "low sun") == with_look(shot(), read_look("low-sun"))
+    file = tmp_path / "dusk.toml"
+    rows = ("schema_version = 1", 'name = "Dusk"', f'lens = "{TESSAR}"', "f_number = 8.0", "[[lights]]")
+    file.write_text("\n".join((*rows, "field_deg = [1.0, 0.0]")), "utf-8")
+    assert with_look(shot(), file)[0].f_number == 8.0
+    with pytest.raises(ProjectError, match="did you mean low-sun"):
+        with_look(shot(), "low-son")

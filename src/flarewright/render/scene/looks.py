@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from typing import Any
 
 from ...errors import ProjectError
 from ...io.measurement.ghost_model_file import is_ghost_model_file
+from ...io.project.look_file import read_look
 from ...model import Art, Bare, Camera, Everywhere, InTurn, Iris, Light, Look, Preset, Project
 from ...model.project.look import CAMERA_KEYS, LIGHT_KEYS
 from ...model.project.project import AsLens, CoatingChoice
@@ -14,14 +16,15 @@ from .photographic_defaults import as_photographed
 from .resolve import open_lens
 
 
-def with_look(project: Project, look: Look) -> tuple[Project, tuple[str, ...]]:
+def with_look(project: Project, look: Look | str | PathLike[str]) -> tuple[Project, tuple[str, ...]]:
     """Apply a look to a project.
 
     Parameters
     ----------
     project : Project
         Its lens, the positions of its lights and all settings that the look does not contain stay.
-    look : Look
+    look : Look, str or path
+        A look, the name of a shipped one, or a file.
 
     Returns
     -------
@@ -33,8 +36,9 @@ def with_look(project: Project, look: Look) -> tuple[Project, tuple[str, ...]]:
     Raises
     ------
     FlarewrightError
-        A lens cannot be read.
+        A lens or the look cannot be read.
     """
+    look = look if isinstance(look, Look) else read_look(look)
     changes: dict[str, Any] = {}
     remarks: list[str] = []
     same_lens = look.example.lens == project.lens
