@@ -302,3 +302,11 @@ def test_a_compressor_without_memory_is_a_lack_of_memory_and_leaves_no_file(tmp_
     with pytest.raises(MemoryError):
         write_exr(tmp_path / "a.exr", [Layer("a", np.ones((4, 4, 3), np.float32), (0, 0, 4, 4))], (4, 4))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_exr_is_not_written_under_the_name_of_another_format(tmp_path, layers):
+    """`write_exr("a.png")` used to write an EXR that no program opens by its name."""
+    for name in ("a.png", "a", "exr"):
+        with pytest.raises(OutputError, match=r"must be named \*\.exr"):
+            write_exr(tmp_path / name, layers, SIZE)
+    assert list(tmp_path.iterdir()) == []

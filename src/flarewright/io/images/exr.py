@@ -29,7 +29,7 @@ import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import frexp, inf
-from os import PathLike
+from os import PathLike, fspath
 from pathlib import Path
 from threading import Lock
 from typing import Any, Literal
@@ -153,10 +153,12 @@ def write_exr(
     Raises
     ------
     OutputError
-        When the file cannot be written.
+        When the file cannot be written, or its name does not end in .exr.
     FlarewrightError
         When there is no layer, two of the same name, or the scale is no power of two.
     """
+    if Path(path).suffix.lower() != ".exr":
+        raise OutputError(f"the output {fspath(path)!r} must be named *.exr")
     names = [layer.name for layer in layers]
     if not names or len(set(names)) != len(names):
         raise FlarewrightError(f"an EXR file needs at least one layer and no name twice, not {names}")
