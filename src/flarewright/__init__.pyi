@@ -14,6 +14,7 @@ from .measure.replay.measured_project import render_measured as render_measured
 from .model import D65 as D65
 from .model import Art as Art
 from .model import AsLens as AsLens
+from .model import Backplate as Backplate
 from .model import Bare as Bare
 from .model import BlackBody as BlackBody
 from .model import Bounds as Bounds
@@ -21,10 +22,13 @@ from .model import Camera as Camera
 from .model import Coating as Coating
 from .model import CoatingChoice as CoatingChoice
 from .model import Design as Design
+from .model import Dirt as Dirt
 from .model import EqualEnergy as EqualEnergy
 from .model import Everywhere as Everywhere
 from .model import Film as Film
 from .model import GhostTarget as GhostTarget
+from .model import Holdout as Holdout
+from .model import Imperfection as Imperfection
 from .model import InTurn as InTurn
 from .model import Iris as Iris
 from .model import Layer as Layer
@@ -37,6 +41,7 @@ from .model import Look as Look
 from .model import Medium as Medium
 from .model import Output as Output
 from .model import PerRow as PerRow
+from .model import Plate as Plate
 from .model import Polygon as Polygon
 from .model import Preset as Preset
 from .model import Project as Project
@@ -50,6 +55,7 @@ from .model import Rule as Rule
 from .model import Scatter as Scatter
 from .model import Stack as Stack
 from .model import Standard as Standard
+from .model import Starburst as Starburst
 from .model import Stop as Stop
 from .model import Surface as Surface
 from .model import Tabulated as Tabulated

@@ -26,7 +26,8 @@ class Layer:
     """
 
     name: str
-    pixels: Pixels
+    # thousands of numbers tell nothing in a terminal
+    pixels: Pixels = field(repr=False)
     window: tuple[int, int, int, int]
     about: dict[str, str | float] = field(default_factory=dict)
 

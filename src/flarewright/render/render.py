@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import groupby
 from math import isfinite, pi, prod
@@ -53,6 +53,7 @@ PIXEL_BYTES = 12
 """Memory of a layer per pixel: three float32."""
 BLACK = "the picture is black: no light comes through the lens to the sensor"
 HIDDEN = "the picture is black: a holdout or a depth plate hides every light"
+DARK = "the picture is black: every light has intensity 0"
 
 
 @dataclass(frozen=True)
@@ -76,13 +77,13 @@ class Rendering:
         The brightest ghosts of each pixel, with `Output.matte`.
     """
 
-    project: Project
+    project: Project = field(repr=False)
     layers: tuple[ShownLayer, ...]
-    summary: dict[str, Any]
+    summary: dict[str, Any] = field(repr=False)
     remarks: tuple[str, ...]
     ledger: Ledger | None = None
     profile: RenderProfile | None = None
-    matte: GhostMatte | None = None
+    matte: GhostMatte | None = field(default=None, repr=False)
 
     def _repr_png_(self) -> bytes:
         """Return the beauty as PNG for notebooks, with the display of the PNG beside an EXR."""
@@ -199,7 +200,9 @@ def render(
     matte = None if ranking is None else _matte(ranking, plain, project, art)
     # line by line: a picture with light ends the search early
     if not any(line.any() for layer in passes for line in layer.pixels):
-        reported = (*reported, BLACK if any(shot.share > 0.0 for shot in shots) else HIDDEN)
+        dark = not any(light.intensity > 0.0 for light in settled.project.lights)
+        hidden = not any(shot.share > 0.0 for shot in shots)
+        reported = (*reported, DARK if dark else HIDDEN if hidden else BLACK)
     account = drawn.ledger
     if ledger and account is None:
         from .reference.energy_ledger import trace_ledger

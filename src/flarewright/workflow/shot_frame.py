@@ -24,7 +24,7 @@ from ..jobs.worker import WRITING
 from ..measure.replay.measured_project import is_measured, render_measured
 from ..model import Layer, Project
 from ..render.image.ocio_space import config_digest, in_file_space
-from ..render.render import BLACK, Rendering
+from ..render.render import BLACK, DARK, Rendering
 from ..render.render import render as render_project
 from ..render.scene.resolve import open_lens, resolve_project
 from .frame_files import with_frame_files
@@ -293,7 +293,7 @@ def _draw(moments: tuple[Project, ...], threads: int | None) -> Rendering:
         mean = [layer for layer in mean if layer.name not in dropped]
     # a lamp may be switched on after the first moment
     lit = any(layer.pixels.any() for layer in mean)
-    remarks = tuple(remark for remark in first.remarks if not (lit and remark == BLACK))
+    remarks = tuple(remark for remark in first.remarks if not (lit and remark in (BLACK, DARK)))
     matte = None if mattes is None else mattes.mean()
     return replace(first, layers=tuple(mean), remarks=remarks, matte=matte)  # type: ignore[arg-type]
 

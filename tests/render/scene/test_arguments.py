@@ -124,3 +124,27 @@ def test_the_signature_names_all_settings():
     assert set(Settings.__annotations__) == set(fw.Project.model_fields) - {"lens", "schema_version"}
     assert [*named] == ["project", "threads", "progress", "run", "ledger", "profile", "kept", *Settings.__annotations__]
     assert "timeline: 'Timeline' = <as in the project>, " in str(inspect.signature(fw.render))
+
+
+def test_every_setting_of_render_can_be_made_with_the_names_of_the_package():
+    """`inspect.signature` named Dirt, Plate, Starburst and others, which `flarewright` did not have."""
+    import re
+
+    plain = {"Sequence", "PathLike"}
+    words = {word for one in Settings.__annotations__.values() for word in re.findall(r"[A-Z]\w+", one.__forward_arg__)}
+    assert sorted(word for word in words - plain - {"None"} if not hasattr(fw, word)) == []
+
+
+def test_a_rendering_shows_itself_briefly():
+    """A terminal used to show hundreds of lines: the pixels, the whole project and the summary."""
+    camera, output = fw.Camera(size_px=(32, 18)), fw.Output(starburst=False)
+    found = fw.render(
+        "triplet-pestrecov", lights=[fw.Light(field_deg=(6.0, 3.0), intensity=0.0)], camera=camera, output=output,
+        quality=fw.Quality(mode="draft"),
+    )  # fmt: skip
+    shown = repr(found)
+    assert len(shown) < 2000
+    assert "array" not in shown
+    assert "name='beauty', window=(0, 0, 32, 18)" in shown
+    # light is said not to come through a lens only if there is some
+    assert "the picture is black: every light has intensity 0" in found.remarks
