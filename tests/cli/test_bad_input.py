@@ -365,7 +365,11 @@ COMMAND_LINES = {
     "two exposures": ([*H, *GOOD, "--ev", "12", "--shutter", "1/50"], "--ev and --shutter"),
     "iso alone": ([*H, *GOOD, "--iso", "400"], "--iso needs --ev or --shutter"),
     "no shutter": ([*H, *GOOD, "--shutter", "1/0"], "--shutter '1/0'"),
-    "no lux": ([*H, *GOOD, "--ev", "12", "--lux", "moon"], "--lux 'moon'"),
+    "no lux": ([*H, *GOOD, "--ev", "12", "--lux", "moon"], "1e+09; write it like 20000 or sun"),
+    "empty lens": (["render", "", *GOOD], "no lens is given"),
+    "empty folder of a gallery": (["gallery", "-o", ""], "the name of the output is empty"),
+    "empty folder of a search": (["design", "solve", "lens.toml", "--output", ""], "the name of the output is empty"),
+    "empty name of an output": (["gallery", "--output="], "the name of the output is empty"),
     "ev far out": ([*H, *GOOD, "--ev", "1e9"], "--ev"),
     "exposure nan": ([*H, *GOOD, "--exposure", "nan"], "--exposure"),
     "unknown paths": ([*H, *GOOD, "--paths", "some"], "--paths"),
@@ -576,7 +580,12 @@ def test_an_iris_image_that_a_lens_file_names_is_looked_for(capsys, folder):
 
 def test_a_binary_project_and_a_folder_as_project(capsys, folder):
     (folder / "bin.toml").write_bytes(bytes(range(256)))
-    refuse(capsys, folder, ["project", "check", "bin.toml"], "UTF-8")
+    # "save it as UTF-8" helps nobody who gave a picture
+    refuse(
+        capsys, folder, ["project", "check", "bin.toml"], "bin.toml is no text in UTF-8 but other data: a project file"
+    )
+    (folder / "bin.toml").write_bytes('lens = "ä"'.encode("utf-16"))
+    refuse(capsys, folder, ["project", "check", "bin.toml"], "save it as UTF-8")
     refuse(capsys, folder, ["project", "check", "."], "is a folder")
 
 

@@ -65,7 +65,7 @@ def call_json(capsys, *words):
 class FakeRendering:
     project: Project
     layers: tuple[Layer, ...]
-    summary: dict = field(default_factory=lambda: {"efl_mm": 1.0, "far": float("inf")})
+    summary: dict = field(default_factory=lambda: {"efl_mm": 1.0, "far": float("inf"), "f_number": 8.0})
     remarks: tuple[str, ...] = ("a remark",)
     ledger: None = None
     profile: None = None
@@ -107,6 +107,25 @@ def test_render_writes_exr_and_preview_and_reports_them(capsys, projects, folder
     assert read_project("again.toml") == project
     assert [layer.name for layer in back.layers] == ["beauty", "ghost.4-1"]
     assert b"exposure" in (folder / "a.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("exposure", "said"),
+    [
+        (("--shutter", "250"), "100 % of the preview is white: the EXR holds all light"),
+        (("--exposure", "-60"), "the preview is black at this exposure"),
+        (("--exposure", "-17"), ""),
+        ((), ""),
+    ],
+)
+@pytest.mark.usefixtures("projects", "folder")
+def test_an_exposure_that_shows_nothing_is_reported(capsys, exposure, said):
+    """A shutter of 250 seconds, meant as 1/250, used to be a white PNG without a word."""
+    words = ("render", "heliar-tronnier", "--ideal", "--light", "1,1", "--size", "8x6", "-o", "a.exr", *exposure)
+    summary = call_json(capsys, *words)
+    found = [remark for remark in summary["remarks"] if "preview is" in remark]
+    assert len(found) == bool(said)
+    assert all(said in remark for remark in found)
 
 
 def test_render_json_is_one_object_and_holds_no_infinity(capsys, projects, folder):

@@ -10,9 +10,17 @@ from typing import TYPE_CHECKING, Any, get_args
 from ...errors import ProjectError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ...model import Project
     from ...render.render import Rendering
     from .options.record import RenderOptions
+
+WHITE_CODE, BLACK_CODE = 250, 2
+"""Codes of 255 that look white and black."""
+MOSTLY = 0.5
+"""Part of a preview that is white when its exposure is a mistake."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +78,7 @@ def preview_look(options: RenderOptions) -> PreviewLook | None:
         transform=view or "filmic", stops=exposure, ev=ev,
         shutter_s=None if shutter is None else _number("--shutter", shutter, "1/250 or 0.004", 1e-6, 1e5),
         iso=iso or 100.0,
-        lux=SUN_LUX if lux is None or lux == "sun" else _number("--lux", lux, "a number or sun", 1e-6, 1e9),
+        lux=SUN_LUX if lux is None or lux == "sun" else _number("--lux", lux, "20000 or sun", 1e-6, 1e9),
     )  # fmt: skip
 
 
@@ -129,8 +137,8 @@ def _number(flag: str, text: str, example: str, low: float, high: float) -> floa
     return value
 
 
-def write_preview(rendering: Rendering, path: Path, look: PreviewLook) -> dict[str, Any]:
-    """Write the PNG of a render and return its entries in the summary."""
+def write_preview(rendering: Rendering, path: Path, look: PreviewLook) -> tuple[dict[str, Any], list[str]]:
+    """Write the PNG of a render; return its entries in the summary, and remarks."""
     from ... import __version__
     from ...io.images.png import write_png
     from ...render.image.display import layers_exposure, view, view_text
@@ -149,4 +157,15 @@ def write_preview(rendering: Rendering, path: Path, look: PreviewLook) -> dict[s
     stated = view_text(stops, look.transform, colorspace, automatic=automatic)
     pixels = view(layers[0].pixels, stops, look.transform, colorspace)
     write_png(path, pixels, {"Software": f"Flarewright {__version__}", "Description": stated})
-    return {"preview": str(path), "view": stated, "exposure_stops": stops}
+    return {"preview": str(path), "view": stated, "exposure_stops": stops}, _misses(pixels, automatic=automatic)
+
+
+def _misses(pixels: NDArray[np.uint8], *, automatic: bool) -> list[str]:
+    """Return a remark on an exposure at which most of a picture is white, or all of it is black."""
+    if automatic:
+        return []
+    remedy = "the EXR holds all light; leave the exposure out for an automatic one"
+    white = float((pixels.min(axis=-1) >= WHITE_CODE).mean())
+    if white > MOSTLY:
+        return [f"{100.0 * white:.0f} % of the preview is white: {remedy}"]
+    return [f"the preview is black at this exposure: {remedy}"] if pixels.max() <= BLACK_CODE else []

@@ -67,7 +67,7 @@ def build_project(flags: RenderOptions) -> Project:
     """
     _check_together(flags)
     base = flags.base
-    if base is None and flags.lens is None:
+    if base is None and not flags.lens:
         raise ProjectError("no lens is given; name one (flarewright lenses lists them) or give a --project file")
     if base is None and not (flags.light or flags.light_px or flags.sun or flags.tracked):
         raise ProjectError("no light is given; give its place in degrees by --light X,Y, for example --light 10,5")

@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 import tomllib
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +86,9 @@ def read_text(path: str | Path, what: str, largest: int = LARGEST, *, foreign: b
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
+        # a picture, say; UTF-16 has zeros too, but begins with its mark
+        if b"\0" in data and not data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+            raise FileError(f"{shown(path)} is no text in UTF-8 but other data: {what} was expected") from None
         raise FileError(f"{shown(path)} is not UTF-8 text (line {line}): save it as UTF-8") from None
     if not foreign and (hint := foreign_hint(text)):
         raise FileError(f"{shown(path)} {hint}")
