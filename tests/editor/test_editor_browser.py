@@ -683,6 +683,31 @@ def test_what_cannot_be_solved_for_yet_says_why(tab):
     assert scratch.is_disabled()
 
 
+def test_why_a_ghost_cannot_be_pulled_is_the_true_reason(tab):
+    """Until places were known, and for every ghost of a lens of cylinders, "reflects on both sides" was stated."""
+    reason = "document.querySelector('#page').innerText"
+    held = []
+    tab.page.route("**/api/places", lambda route: held.append(route))  # noqa: PLW0108 - built-ins are refused
+    tab.tab("target")
+    tab.js("flarewright.choose('4-0')")
+    tab.until("flarewright.ghost === '4-0'")
+    tab.until(f"{reason}.includes('Finding the ghosts that design can move')")
+    assert "both sides" not in tab.js(reason)
+    for route in held:
+        route.continue_()
+    tab.page.unroute("**/api/places")
+    tab.until(f"{reason}.includes('Drag it along the line')")
+    tab.js("flarewright.choose('7-1')")
+    tab.until(f"{reason}.includes('Ghost 7-1 reflects on both sides of the stop')")
+    tab.js("flarewright.command('choose_lens', {lens: 'anamorphic-heliar-2x'})")
+    tab.until("flarewright.state.lens.name.startsWith('Anamorphic')")
+    tab.until("flarewright.ghosts.ghosts.length")
+    tab.js("flarewright.choose(flarewright.ghosts.ghosts[0].name)")
+    tab.until(f"{reason}.includes('has cylinders or toroids; design works with lenses of revolution')")
+    assert "both sides" not in tab.js(reason)
+    tab.said.clear()
+
+
 def test_words_of_the_page_leave_room_for_each_other(tab):
     """Toasts, row numbers, a ghost's remark, a light's angles and the notes below the table, at 1280 by 720."""
     tab.js("fetch('/api/open', {method: 'POST', body: JSON.stringify({text: 'canon-28-80'})})")

@@ -54,6 +54,7 @@ function take(state) {
   // the target of a new ghost may be undone
   if (app.ghostTarget !== null && state.design?.ghost_targets[app.ghostTarget]?.ghost !== null) app.ghostTarget = null;
   if (before.places !== known.places) app.view.forget();
+  if (before.ghosts !== known.ghosts) app.view.unplaced = 'Finding the ghosts that design can move…';
   // reset the player for another project
   if (old && old.opened !== state.opened) app.player.reset();
   const moved = !old || before.shot !== known.shot;
@@ -194,7 +195,7 @@ app.hint = () => {
 };
 app.places = latest(async () => {
   if (app.tab !== 'target' || app.state?.lens.measured) return;
-  try { app.view.places = (await get('api/places')).places; } catch { app.view.places = []; }
+  try { app.view.places = (await get('api/places')).places; app.view.unplaced = ''; } catch (error) { app.view.places = []; app.view.unplaced = inWords(error); }
   panels.target.update?.(app.state);
   app.view.redraw();
 });

@@ -88,7 +88,7 @@ export function targetPanel(app) {
       drawn.hidden = app.view.compare === 'physical';
       drawn.textContent = matrices(state);
       const chosen = app.ghostTarget !== null || Boolean(own());
-      reported.textContent = app.ghost && !own() && app.ghostTarget === null ? `Ghost ${app.ghost} reflects on both sides of the stop; design can move those that reflect twice on one side.`
+      reported.textContent = app.ghost && !own() && app.ghostTarget === null ? app.view.unplaced || `Ghost ${app.ghost} reflects on both sides of the stop; design can move those that reflect twice on one side.`
         : chosen ? 'Drag it along the line, or its rim to resize it.' : 'Click a ghost to set its target.';
       refill(list, (state.design?.ghost_targets ?? []).map((ghostTarget, number) => button(state.design.names[number], () => (ghostTarget.ghost ? app.choose(ghostTarget.ghost) : app.chooseGhostTarget(number)), { kind: (ghostTarget.ghost ? ghostTarget.ghost === app.ghost && app.ghostTarget === null : number === app.ghostTarget) ? 'on' : '' })));
       fields.element.hidden = !chosen;

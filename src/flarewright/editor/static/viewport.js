@@ -25,7 +25,7 @@ export function viewport(canvas, app) {
   const pen = canvas.getContext('2d', { alpha: false });
   const self = {
     image: null, before: null, fadeFrom: 0, target: null, outline: null, hover: null, compare: 'physical', wipe: 0.5,
-    zoom: 1, panX: 0, panY: 0, drag: null, stack: [], at: 0, spot: null, asked: null, annotate: false, places: [], preview: null,
+    zoom: 1, panX: 0, panY: 0, drag: null, stack: [], at: 0, spot: null, asked: null, annotate: false, places: [], unplaced: '', preview: null,
   };
   let wanted = false;
   // areas of labels in the present frame
