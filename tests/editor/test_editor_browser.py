@@ -611,6 +611,23 @@ def test_readable_at_1280x720(tab):
     assert max(bar) <= 1280
 
 
+def test_all_panels_can_be_reached_in_a_narrow_window(tab):
+    """In half a screen the panels beyond its edge used to be out of reach."""
+    tab.page.set_viewport_size({"width": 800, "height": 600})
+    tab.page.mouse.move(300, 300)
+    tab.page.mouse.wheel(0, 0)
+    tab.js("document.documentElement.scrollLeft = 1000")
+    last = tab.page.locator("[data-tab=library]").bounding_box()
+    assert last["x"] >= 0
+    assert last["x"] + last["width"] <= 800
+    # the light follows the pointer there too
+    first = tab.light()
+    tab.drag(first, (first[0] - 60, first[1] + 30), hold_ms=30)
+    tab.rest()
+    now = tab.light()
+    assert np.hypot(now[0] - first[0] + 60, now[1] - first[1] - 30) < 3.0
+
+
 def box_of(tab, selector):
     left, top, right, bottom = tab.js(
         f"(() => {{ const b = document.querySelector({json.dumps(selector)}).getBoundingClientRect();"
