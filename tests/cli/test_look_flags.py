@@ -181,3 +181,12 @@ def test_an_unknown_look_is_reported(words, reported, dusk, tmp_path, monkeypatc
     (tmp_path / "model.json").write_text("{}")
     assert run(["render", *words, "-o", "a.exr"]) == 2
     assert reported in capsys.readouterr().err
+
+
+def test_a_look_wider_than_the_lens_is_reported_unless_a_flag_sets_the_opening(projects, capsys):
+    call("heliar-tronnier", "--light", "-9,5", "--look", "warm-vintage")
+    assert "is wider than Heliar-Tronnier 100 mm f/3.5 opens: f/3.5" in capsys.readouterr().err
+    call("heliar-tronnier", "--light", "-9,5", "--look", "warm-vintage", "--fstop", "8")
+    assert "is wider" not in capsys.readouterr().err
+    assert [project.f_number for project in projects] == [3.5, 8.0]
+    assert projects[0].coating == projects[1].coating

@@ -127,3 +127,13 @@ def test_a_look_can_be_given_by_name_or_file(tmp_path):
     assert with_look(shot(), file)[0].f_number == 8.0
     with pytest.raises(ProjectError, match="did you mean low-sun"):
         with_look(shot(), "low-son")
+
+
+def test_a_look_wider_than_the_lens_says_which_opening_is_used():
+    """The f-number used to be changed without a word."""
+    look = read_look("warm-vintage")
+    after, remarks = with_look(Project(lens="heliar-tronnier", lights=shot().lights), look)
+    assert after.f_number == 3.5 > look.example.f_number
+    assert remarks == (
+        f"the look's f/{look.example.f_number:g} is wider than Heliar-Tronnier 100 mm f/3.5 opens: f/3.5",
+    )

@@ -39,6 +39,9 @@ def flags_with_look(flags: RenderOptions, name: str) -> tuple[RenderOptions, fro
     if flags.resume is not None:
         raise ProjectError("--resume continues a picture with its settings; omit --look")
     look = read_look(name)
+    if flags.fstop is not None and (others := tuple(key for key in look.says if key != "f_number")):
+        # no remark on an f-number that the flag overrides
+        look = look.replace(says=others)
     base = flags.base
     stage = base or look.example
     lens = stage.lens if flags.lens is None else flags.lens

@@ -47,7 +47,12 @@ def with_look(project: Project, look: Look | str | PathLike[str]) -> tuple[Proje
         if section == "coating":
             changes["coating"] = look.example.coating if same_lens else _transferred_coating(look.example, project)
         elif section == "f_number" and look.example.f_number is not None:
-            changes["f_number"] = max(look.example.f_number, open_lens(project.lens).lens.f_number)
+            lens = open_lens(project.lens).lens
+            changes["f_number"] = max(look.example.f_number, lens.f_number)
+            if look.example.f_number < lens.f_number:
+                remarks.append(
+                    f"the look's f/{look.example.f_number:g} is wider than {lens.name} opens: f/{lens.f_number:g}"
+                )
         elif section == "art":
             art = look.example.art if same_lens else without_lens_rules(look.example.art)
             if (lost := len(look.example.art.rules) - len(art.rules)) > 0:
