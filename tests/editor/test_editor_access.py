@@ -321,6 +321,8 @@ def test_a_token_is_no_option(tmp_path, capsys):
         (["--token-file", str(tmp_path / "short")], "too short"),
         (["--token-file", str(tmp_path / "none")], "does not exist"),
         (["--base-url", "ftp://x"], "is no address"),
+        # used to be accepted, and nothing in it could be opened
+        (["--root", str(tmp_path / "nope")], "nope is no folder; give one that exists"),
     ):
         assert run(["edit", "--no-browser", *words]) == 2
         printed = capsys.readouterr().err

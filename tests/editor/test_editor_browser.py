@@ -1092,6 +1092,11 @@ def test_a_light_that_is_added_is_chosen(tab):
     # and it is the one that moves
     type_into(tab, "light_x", "2")
     tab.until("flarewright.state.lights[2].field_deg[0] === 2")
+    # Delete removes the chosen light, also when it was chosen by its name; it used to do nothing there
+    tab.page.click(".lamps button:has-text('Light 2')")
+    tab.page.keyboard.press("Delete")
+    tab.until("flarewright.state.lights.length === 2")
+    assert tab.state()["lights"][1]["field_deg"][0] == 2.0
 
 
 def test_the_time_of_a_path_is_reset_with_another_project(tab, tmp_path):

@@ -3,9 +3,11 @@
 import errno
 import json
 import os
+import re
 import subprocess
 import sys
 import threading
+from importlib.resources import files
 
 import pytest
 
@@ -770,3 +772,14 @@ ThreadPoolExecutor(1).submit(lambda: (failed.wait(10.0), time.sleep(0.2), print(
 def test_a_lens_named_on_the_command_line_has_a_separate_autosave():
     assert autosave_path(None) != autosave_path("tessar-brendel")
     assert Light(field_deg=(0, 0)) is not None
+
+
+def test_the_spectra_of_the_page_are_found_again_by_their_text():
+    """The list showed "lines:589*1,589.6*1" after a choice of its own Sodium lamp."""
+    from flarewright.io.project.spectrum_text import parse_spectrum, spectrum_text
+
+    page = (files("flarewright.editor") / "static" / "panel_light.js").read_text("utf-8")
+    (listed,) = re.findall(r"^const SPECTRA = (.*);$", page, re.MULTILINE)
+    keys = re.findall(r"\['([^']+)', '[^']+'\]", listed)
+    assert len(keys) > 5
+    assert [spectrum_text(parse_spectrum(key)) for key in keys] == keys

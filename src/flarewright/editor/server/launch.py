@@ -8,6 +8,7 @@ import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
 
+from ...errors import ProjectError
 from ...io.files.state_folder import state_folder
 from ...typing import Report
 from ..session.reach import reach_of
@@ -60,6 +61,9 @@ def open_editor(
     ProjectError
         When a file, the token or an address cannot be used, or the port is taken.
     """
+    for folder in folders:
+        if not folder.expanduser().is_dir():
+            raise ProjectError(f"--root {folder} is no folder; give one that exists")
     access = access_of(token_of(token_file), host, base_url)
     session, greeting = begin(what)
     given = [] if what is None or not Path(what).exists() else [Path(what).resolve().parent]

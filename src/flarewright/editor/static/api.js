@@ -36,7 +36,7 @@ async function send(path, body) {
 export const sentence = (text) => {
   const plain = String(text).trim();
   // do not capitalise the name of a file or a field
-  const name = /^\S+[._]\w+\b/.test(plain) || /^(?!(?:cannot|the|an?) )[^:;,]+\.\w{2,5}(?:: | (?:is|has|does|holds|was) )/.test(plain);
+  const name = /^\S+[._]\w+\b/.test(plain) || /^(?!(?:cannot|the|an?) )[^:;,]+\.\w{2,5}(?:: | (?:is|has|does|holds|was|cannot) )/.test(plain);
   return (name ? plain.charAt(0) : plain.charAt(0).toUpperCase()) + plain.slice(1) + (/[.!?]$/.test(plain) ? '' : '.');
 };
 

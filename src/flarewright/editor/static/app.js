@@ -439,8 +439,8 @@ function nudge(dx, dy, big) {
   Object.assign(ahead, { asked: ahead.asked + 1, light: app.light, place: light.field_deg });
   app.lively('move_light', { light: app.light, x: light.field_deg[0], y: light.field_deg[1] }, nudging).finally(() => { ahead.asked -= 1; });
 }
-// Only where the keys work on the picture: in a list, Delete has another meaning.
-const removeLight = () => { if (document.activeElement === $('view') && app.state.lights.length > 1) app.command('remove_light', { light: app.light }).catch(() => {}); };
+// Only where the keys work on the picture, or where a light was just chosen: in another list, Delete has another meaning.
+const removeLight = () => { if ((document.activeElement === $('view') || document.activeElement.closest('.lamps')) && app.state.lights.length > 1) app.command('remove_light', { light: app.light }).catch(() => {}); };
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const PAN_PX = 40;
 addEventListener('keyup', (event) => { if (event.key.startsWith('Arrow')) nudging = null; if (event.key === ' ') app.view.space = false; });

@@ -5,7 +5,7 @@ import { plateGroup } from './group_plate.js';
 import { ofLens } from './of_lens.js';
 import { button, choice, entry, group, h, refill, row, slider, tick } from './ui.js';
 
-const SPECTRA = [['d65', 'Daylight D65'], ['equal-energy', 'Equal energy'], ['black-body:3200', 'Tungsten 3200 K'], ['black-body:5600', 'Black body 5600 K'], ['black-body:2000', 'Candle 2000 K'], ['lines:589.0,589.6', 'Sodium lamp'], ['rgb:1,0.25,0.1', 'Red light'], ['rgb:0.15,0.4,1', 'Blue light']];
+const SPECTRA = [['d65', 'Daylight D65'], ['equal-energy', 'Equal energy'], ['black-body:3200', 'Tungsten 3200 K'], ['black-body:5600', 'Black body 5600 K'], ['black-body:2000', 'Candle 2000 K'], ['lines:589*1,589.6*1', 'Sodium lamp'], ['rgb:1,0.25,0.1', 'Red light'], ['rgb:0.15,0.4,1', 'Blue light']];
 const SENSORS = [['', '36 mm wide'], ['36x24', 'Full frame 36 × 24'], ['24.89x18.66', 'Super 35 4-perf'], ['23.6x15.7', 'APS-C'], ['17.3x13', 'Four Thirds'], ['54.12x25.58', 'Large format 65'], ['43.8x32.9', 'Medium 44 × 33']];
 const SIZES = [['1280x720', '1280 × 720'], ['1920x1080', '1920 × 1080'], ['2048x1080', '2K DCI'], ['3840x2160', '3840 × 2160'], ['4096x2160', '4K DCI'], ['1500x1000', '3:2 1500 × 1000'], ['1440x1080', '4:3 1440 × 1080'], ['1080x1080', 'Square'], ['2048x858', '2.39:1']];
 
