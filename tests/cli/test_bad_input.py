@@ -366,6 +366,7 @@ COMMAND_LINES = {
     "iso alone": ([*H, *GOOD, "--iso", "400"], "--iso needs --ev or --shutter"),
     "no shutter": ([*H, *GOOD, "--shutter", "1/0"], "--shutter '1/0'"),
     "no lux": ([*H, *GOOD, "--ev", "12", "--lux", "moon"], "1e+09; write it like 20000 or sun"),
+    "preset without its word": ([*H, *GOOD, "--coating", "staggered"], "for the lens: lens, preset:NAME or a"),
     "empty lens": (["render", "", *GOOD], "no lens is given"),
     "empty folder of a gallery": (["gallery", "-o", ""], "the name of the output is empty"),
     "empty folder of a search": (["design", "solve", "lens.toml", "--output", ""], "the name of the output is empty"),

@@ -83,6 +83,11 @@ def parse_coating(text: str) -> Coating:
     ProjectError
         When the text has none of the forms, or a number is out of range.
     """
+    return _parsed(text, HELP)
+
+
+def _parsed(text: str, forms: str) -> Coating:
+    """Return the coating of a text; `forms` are those that the message for other texts names."""
     plain = re.sub(r"\s+", "", text).lower()
     if plain in ("none", "bare"):
         return Bare()
@@ -102,7 +107,7 @@ def parse_coating(text: str) -> Coating:
         raise ProjectError(f"coating {text!r}: {'; '.join(validation_sentences(error))}") from None
     except ValueError:
         pass
-    raise ProjectError(f"coating {text!r} is not understood{did_you_mean(plain, STANDARD_NAMES)}: {HELP}")
+    raise ProjectError(f"coating {text!r} is not understood{did_you_mean(plain, STANDARD_NAMES)}: {forms}")
 
 
 def parse_coating_choice(text: str, *, folder: Path | None = None) -> CoatingChoice:
@@ -130,7 +135,7 @@ def parse_coating_choice(text: str, *, folder: Path | None = None) -> CoatingCho
         return Preset(name=rest.strip())
     if text.strip().lower().endswith(".toml"):
         return read_coating_file((folder or Path()) / text.strip())
-    return Everywhere(coating=parse_coating(text))
+    return Everywhere(coating=_parsed(text, f"{HELP}; for the lens: lens, preset:NAME or a coating file *.toml"))
 
 
 def coating_choice(coating: str | PathLike[str] | Coating | CoatingChoice | None) -> CoatingChoice:
