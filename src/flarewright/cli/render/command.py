@@ -404,6 +404,7 @@ def _write(
     if rendering.matte is not None:
         files["matte"] = {"name": NAME, "objects": len(rendering.matte.names), "ranks": len(rendering.matte.light)}
     if look is not None:
-        files |= write_preview(rendering, output.with_suffix(".png"), look)
-        remarks.append(f"the preview shows {files['view']}")
+        shown, missed = write_preview(rendering, output.with_suffix(".png"), look)
+        files |= shown
+        remarks += [f"the preview shows {files['view']}", *missed]
     return files, remarks
