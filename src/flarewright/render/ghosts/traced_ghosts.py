@@ -439,6 +439,8 @@ def draw_alone(
         draw_final(own_item, quality, sheet, visible, stop=stop, around=beside, detail=0, costs=costs)
     # separate planes hold blocks of float32
     pixels, corner = merge(sheet.planes, sheet.size_px).astype(np.float32, copy=False), (0, 0)
+    # as large as the picture, and another copy follows
+    del sheet
     if kernel is not None:
         pixels, corner = spread_window(pixels, kernel)
     if not art.alone:

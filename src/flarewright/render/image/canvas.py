@@ -16,7 +16,7 @@ Plane = Pixels | Floats
 
 # a canvas holds planes at full, half and quarter resolution
 DETAILS = 3
-# rows of a picture that are tested together
+# rows of a picture that are tested, or copied, together
 _STRIP = 32
 # contrasts below which ghosts are drawn at half and at quarter resolution
 DETAIL_CONTRAST = (1.5e-2, 4e-3)
@@ -64,10 +64,13 @@ class Canvas:
         if not pixels.size:
             return
         first, last = x // BLOCK, -(-(x + width) // BLOCK)
-        padded = np.zeros((height, (last - first) * BLOCK, 3), dtype=pixels.dtype)
-        padded[:, x - first * BLOCK : x - first * BLOCK + width] = pixels
         window = self.plane(detail)[y : y + height, first:last]
-        window += np.moveaxis(padded.reshape(height, last - first, BLOCK, 3), 3, 2)
+        # in bands of rows: a padded copy of the whole picture would be large
+        for top in range(0, height, _STRIP):
+            band = pixels[top : top + _STRIP]
+            padded = np.zeros((len(band), (last - first) * BLOCK, 3), dtype=pixels.dtype)
+            padded[:, x - first * BLOCK : x - first * BLOCK + width] = band
+            window[top : top + _STRIP] += np.moveaxis(padded.reshape(len(band), last - first, BLOCK, 3), 3, 2)
 
 
 def merge(planes: Sequence[Plane | None], size_px: tuple[int, int]) -> Plane:
