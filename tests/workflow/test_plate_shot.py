@@ -15,7 +15,7 @@ from flarewright.errors import FlarewrightError
 from flarewright.io.images.exr import read_exr
 from flarewright.model import Holdout, ProjectCurve
 from flarewright.plates.settings import PlateSettings
-from flarewright.render.render import BLACK
+from flarewright.render.render import DARK
 from flarewright.workflow.plates.plate_files import plate_frames
 from flarewright.workflow.plates.plate_frame import alike_lights
 from flarewright.workflow.plates.plate_sources import plate_shot, sources_file
@@ -24,12 +24,12 @@ from flarewright.workflow.shot_frame import _draw
 
 SIZE = (64, 36)
 ROWS, COLUMNS = np.mgrid[: SIZE[1], : SIZE[0]] + 0.5
-DARK = Light(field_deg=(0.0, 0.0), intensity=0.0)
+UNLIT = Light(field_deg=(0.0, 0.0), intensity=0.0)
 
 
 def project(**changes):
     fields = {
-        "lens": "heliar-tronnier", "f_number": 11.0, "lights": [DARK], "camera": Camera(size_px=SIZE),
+        "lens": "heliar-tronnier", "f_number": 11.0, "lights": [UNLIT], "camera": Camera(size_px=SIZE),
         "quality": Quality(mode="draft", wavelengths=3),
     }  # fmt: skip
     return Project(**{**fields, **changes})
@@ -147,7 +147,7 @@ def test_a_sequence_of_mattes_hides_the_lights_of_its_frames(plates, tmp_path):
 
 def test_own_lights_stay_and_the_plates_lights_come_in_addition(plates, tmp_path):
     lamp = Light(name="own", field_deg=(-5.0, -3.0), intensity=1e-4)
-    result = draw(plates, tmp_path, project(lights=[lamp, DARK]), frames="1001", over=None)
+    result = draw(plates, tmp_path, project(lights=[lamp, UNLIT]), frames="1001", over=None)
     assert result.frames[0].drawn
     assert "own" in read_exr(tmp_path / "f.1001.exr").metadata["project"]
     assert read_exr(tmp_path / "f.1001.exr").metadata["project"].count("[[lights]]") == 2
@@ -263,5 +263,5 @@ def test_a_frame_that_is_dark_only_at_first_is_not_called_black():
         quality=Quality(mode="draft", wavelengths=1),
     )  # fmt: skip
     off = on.replace(lights=(Light(field_deg=(5, 3), intensity=0.0),))
-    assert BLACK in _draw((off, off), 1).remarks
-    assert BLACK not in _draw((off, on), 1).remarks
+    assert DARK in _draw((off, off), 1).remarks
+    assert DARK not in _draw((off, on), 1).remarks

@@ -46,9 +46,11 @@ _OPTION_OF = {
     "starburst.cats_eye": "cats_eye", "starburst.size": "starburst_size", "starburst.spiral_deg": "starburst_spiral",
     "output.layers": "layers", "output.brightest": "brightest", "output.gamut": "gamut",
     "output.compression": "compression", "output.starburst": "no_starburst", "output.matte": "matte",
-    "output.matte_ranks": "matte_ranks", "timeline.fps": "fps", "timeline.start": "start",
+    "output.matte_ranks": "matte_ranks",
     "output.colorspace": "colorspace", "output.ocio_space": "colorspace", "output.ocio_config": "ocio",
 }  # fmt: skip
+# the same of options of shots
+_SHOT_OPTION_OF = {"timeline.fps": "fps", "timeline.start": "start"}
 # sections that options set key by key; `space_flags` has three keys of the output
 _SECTIONS = ("camera", "quality", "dirt", "starburst", "output")
 _OF_SPACE = ("output.colorspace", "output.ocio_space", "output.ocio_config")
@@ -422,7 +424,7 @@ def scatter_flags(
 
 def in_flags(sentence: str) -> str:
     """Replace keys of a project file in a message by flags."""
-    for key, option in _OPTION_OF.items():
+    for key, option in (_OPTION_OF | _SHOT_OPTION_OF).items():
         found = re.match(rf"(?:lights\[\d+\]\.)?{re.escape(key)}(?:\[\d\])?(?=[ :])", sentence)
         if found:
             return f"--{option.replace('_', '-')}{sentence[found.end() :]}"
