@@ -67,8 +67,10 @@ def test_a_coating_by_itself_is_on_all_surfaces():
     everywhere = fw.Everywhere(coating=fw.Standard(name="early-multicoat"))
     for coating in ("early-multicoat", fw.Standard("early-multicoat"), everywhere):
         assert project_of("canon-28-80", lights=LIGHTS, coating=coating).coating == everywhere
-    project = fw.Project(lens="canon-28-80", lights=LIGHTS, coating=fw.Standard("early-multicoat"))
-    assert project.coating == everywhere
+    for coating in ("early-multicoat", fw.Standard("early-multicoat")):
+        project = fw.Project(lens="canon-28-80", lights=LIGHTS, coating=coating)
+        assert project.coating == everywhere
+    assert fw.Project(lens="canon-28-80", lights=LIGHTS, coating="lens").coating == fw.AsLens()
     assert project_of(project, coating=None).coating == fw.AsLens()
     assert project_of(project) is project
 
@@ -84,7 +86,7 @@ def test_a_standard_coating_needs_no_keyword():
 
 def test_a_project_says_who_reads_texts():
     with pytest.raises(
-        fw.ProjectError, match=r"one of uncoated.*, or flarewright\.parse_coating_choice\('preset:nosuch'\)"
+        fw.ProjectError, match=r"one of uncoated.*; flarewright\.parse_coating_choice\('preset:nosuch'\) reads"
     ):
         fw.Project(coating="preset:nosuch")
     with pytest.raises(

@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field, StrictBool, field_validator, model_v
 
 from ...errors import ProjectError
 from ..base import Frozen
-from ..lens.coating import COATINGS, STANDARD_NAMES, Coating
+from ..lens.coating import COATINGS, STANDARD_NAMES, Coating, Standard
 from ..lens.imperfection import Imperfection
 from ..lens.iris import Iris
 from ..lens.plate import Plate
@@ -205,7 +205,8 @@ class Project(Frozen):
     iris : Iris or None
         None: the lens file's.
     coating : CoatingChoice
-        A plain coating means `Everywhere`; `flarewright.parse_coating_choice` reads the command line's texts.
+        A plain coating, or the name of a standard one, means `Everywhere`, and the text `lens` means `AsLens`. The
+        command line's other texts are read by `flarewright.parse_coating_choice`.
     dirt : Dirt
         Dirt in the pupil; none by default.
     starburst : Starburst
@@ -261,13 +262,19 @@ class Project(Frozen):
 
     @field_validator("coating", mode="before")
     @classmethod
-    def _coating_is_no_text(cls, coating: Any) -> Any:
-        if isinstance(coating, str):
-            raise ProjectError(
-                f"coating {coating!r} is a text; write coating=flarewright.Standard(NAME) with one of "
-                f"{', '.join(STANDARD_NAMES)}, or flarewright.parse_coating_choice({coating!r}) for others"
-            )
-        return everywhere(coating)
+    def _coating_of_a_word(cls, coating: Any) -> Any:
+        if not isinstance(coating, str):
+            return everywhere(coating)
+        word = coating.strip()
+        if word == "lens":
+            return AsLens()
+        for name in STANDARD_NAMES:
+            if word.lower() == name:
+                return everywhere(Standard(name))
+        raise ProjectError(
+            f"coating {coating!r} is not lens or one of {', '.join(STANDARD_NAMES)}; "
+            f"flarewright.parse_coating_choice({coating!r}) reads the other words of the command line"
+        )
 
     @field_validator("zoom")
     @classmethod
