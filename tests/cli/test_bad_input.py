@@ -272,6 +272,7 @@ COMMAND_LINES = {
     "no lens": (["render", *GOOD], "no lens is given"),
     "no light": ([*H, "-o", "a.exr"], "no light is given"),
     "unknown flag": ([*H, *GOOD, "--glow"], "no such option: --glow"),
+    "flag for an argument": (["render", "--lens", "heliar-tronnier", *GOOD], "LENS is written without --lens"),
     "unknown lens": (["render", "heliar-tronier", *GOOD], "did you mean heliar-tronnier"),
     "lens is a folder": (["render", ".", *GOOD], "folder"),
     "lens is a picture": (["render", "picture.png", *GOOD], "kind"),

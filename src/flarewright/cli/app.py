@@ -381,6 +381,10 @@ def _usage(error: Any) -> str:
     for theirs, ours in _TYPES.items():
         message = message.replace(theirs, ours)
     context = getattr(error, "ctx", None)
+    option = str(getattr(error, "option_name", "")).removeprefix("--")
+    for one in context.command.params if context else ():
+        if option and one.param_type_name == "argument" and option == one.name:
+            message = f"{one.metavar or one.name.upper()} is written without --{option}"
     return f"{message}; see {context.command_path if context else 'flarewright'} --help"
 
 
