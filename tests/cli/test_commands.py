@@ -297,7 +297,11 @@ def _caused_by(error, cause):
             "flarewright: error: there is",
         ),
         (RuntimeError("can't start new thread"), 2, "flarewright: error: there is not enough memory"),
-        (OSError(28, "No space left on device"), 2, "flarewright: error: No space left on device"),
+        (
+            OSError(28, "No space left on device"),
+            2,
+            "flarewright: error: cannot write the output: no space left on device; free some space",
+        ),
     ],
 )
 def test_what_stops_a_render_is_one_sentence_and_leaves_nothing(capsys, monkeypatch, folder, error, code, words):

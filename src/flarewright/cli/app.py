@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import gc
+import io
 import os
 import sys
 from collections.abc import Iterator, Sequence
@@ -164,6 +166,8 @@ def main() -> None:
     """Run the program with the arguments of the process, and exit."""
     # imported objects live until the end, so exclude them from garbage collection
     gc.set_threshold(100_000)
+    if isinstance(sys.stderr, io.TextIOWrapper):
+        sys.stderr = _lossy(sys.stderr)
     end_as_interrupted()
     try:
         code = run(sys.argv[1:])
@@ -219,6 +223,23 @@ def _open_closed_streams() -> None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 - stays open
 
 
+class _LossyFile(io.FileIO):
+    """A file that drops what the system does not accept."""
+
+    def write(self, data: Any, /) -> int:
+        """Write bytes, or drop them."""
+        try:
+            return super().write(data)
+        except OSError:
+            return len(data)
+
+
+def _lossy(stream: io.TextIOWrapper) -> io.TextIOWrapper:
+    """Return a stream of remarks to the same file: a log on a full disk, or a closed pipe, ends no job of hours."""
+    raw = _LossyFile(stream.fileno(), "w", closefd=False)
+    return io.TextIOWrapper(io.BufferedWriter(raw), encoding=stream.encoding, errors="replace", line_buffering=True)
+
+
 def _check_threads() -> None:
     """Remove a number of threads that Numba cannot read, with one sentence instead of a warning with its source."""
     text = os.environ.get("NUMBA_NUM_THREADS")
@@ -270,8 +291,7 @@ def _call(words: list[str]) -> int:
     except OSError as error:
         if _lacks_memory(error):
             return _fail(_no_memory(words))
-        where = f"{str(error.filename)[:200]}: " if error.filename else ""
-        return _fail(f"{where}{error.strerror or error}")
+        return _fail(_system_sentence(error))
     except SystemExit as end:
         # Typer's own answer to a broken pipe.
         if end.code == 1:
@@ -298,6 +318,14 @@ def _check_outputs(words: Sequence[str]) -> None:
     """Refuse an empty name after -o: as a path it is the present folder, which `-o "$UNSET"` would fill."""
     if any(flag in ("-o", "--output") and not name for flag, name in pairwise(words)) or "--output=" in words:
         raise OutputError("the name of the output is empty; give a file or a folder")
+
+
+def _system_sentence(error: OSError) -> str:
+    """Return the sentence on what the system refuses; a full disk without the name of a file is that of stdout."""
+    reason = (error.strerror or str(error)).lower()
+    if error.filename is None and error.errno == errno.ENOSPC:
+        return f"cannot write the output: {reason}; free some space, or write it elsewhere"
+    return f"{str(error.filename)[:200]}: {reason}" if error.filename else reason
 
 
 @contextmanager
