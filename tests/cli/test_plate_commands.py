@@ -49,6 +49,15 @@ def test_sources_are_listed_marked_and_written(capsys, folder):
     assert sorted(path.name for path in folder.iterdir()) == ["l.csv", "m.png", "photo.png"]
 
 
+def test_stops_choose_the_lights(capsys, folder):
+    """The flag raised KeyError wherever no project has a plate."""
+    thresholds = []
+    for stops in ("1", "2"):
+        assert run(["sources", "photo.png", "--stops", stops, "--json"]) == 0
+        thresholds.append(json.loads(capsys.readouterr().out)["threshold"])
+    assert thresholds[1] == pytest.approx(2.0 * thresholds[0])
+
+
 def test_a_still_gives_a_flare_and_a_comp(capsys, folder):
     words = ["shot", "photo.png", *FAST, "--highlights", "50", "-o", "f.exr", "--over", "c.exr", "--json"]
     assert run(words) == 0

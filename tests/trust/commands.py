@@ -35,7 +35,7 @@ ARGUMENTS: dict[str, tuple[str, ...]] = {
     "film": ("matte.####.png", "-o", "new.mp4", "--json"),
     "nuke-script": ("flare.exr", "-o", "flare.nk", "--json"),
     "dataset": ("pairs.toml", "-n", "1", "-o", "pairs", "--processes", "1", "--json"),
-    "sources": ("flare.exr", "--threshold", "1e-3", "--json"),
+    "sources": ("flare.exr", "--json"),
     "ghosts": ("tessar-brendel", "--light", "5,3", "--json"),
     "predict": ("tessar-brendel", "--samples", "5", "--quality", "draft", "--json"),
     "lenses": (),

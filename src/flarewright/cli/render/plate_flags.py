@@ -59,6 +59,6 @@ def plate_settings(plate: str | None, options: PlateOptions, own: Backplate | No
     }  # fmt: skip
     base = {} if own is None else search_values(own)
     if options.stops is not None:
-        base.pop("threshold")
+        base.pop("threshold", None)
     values = {**base, **{key: value for key, value in values.items() if value is not None}}
     return PlateSettings(plate, **{key: value for key, value in values.items() if value is not None})  # type: ignore[arg-type]
