@@ -87,6 +87,8 @@ def test_a_film_has_the_exposure_and_the_view_that_are_asked_for(capsys, folder)
         ("film drive.mp4 -o f.mp4", "drive.mp4 is a film already; give the frames of one"),
         ("film p.####.png -o f.avi", "the film f.avi must be named *.mp4 (H.264) or *.mov"),
         ("film p.####.png -o f.mp4 --fps 0", "--fps 0 is no frame rate"),
+        # as a fraction with a small denominator it was 0, and a division ended in a traceback
+        ("film p.####.png -o f.mp4 --fps 1e-300", "--fps 1e-300 is no frame rate: give a number from 0.01 to 1000"),
         ("film p.####.png -o f.mp4 --view log", "--view 'log' is unknown; choose filmic, srgb, aces"),
         ("film p.####.png -o f.mp4 --layer sky", "has no layers"),
         ("film p.####.png -o f.mp4 --frames 1-9", "lacks frames 4-9; there are 1-3"),

@@ -185,8 +185,8 @@ def check_place(path: Path, suffix: str | tuple[str, ...]) -> None:
 
 def check_rate(fps: float | None) -> None:
     """Raise ProjectError for a number of `--fps` that is no frame rate."""
-    if fps is not None and not 0.0 < fps <= 1000.0:
-        raise ProjectError(f"--fps {fps:g} is no frame rate: give a number above 0, such as 24 or 23.976")
+    if fps is not None and not 0.01 <= fps <= 1000.0:
+        raise ProjectError(f"--fps {fps:g} is no frame rate: give a number from 0.01 to 1000, such as 24 or 23.976")
 
 
 def check_free(path: Path, force: bool) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from itertools import product
+from math import ceil
 
 import numpy as np
 import pytest
 from pupil_sum import mono, picture, scene
 
 from flarewright.errors import ProjectError
+from flarewright.kernels.montecarlo.forward import IN_PICTURE
 from flarewright.kernels.tracing.sequential import REFLECT
 from flarewright.model import Art, Camera, Rule
 from flarewright.optics.lens.paths import four_path
@@ -92,6 +94,14 @@ def test_a_lower_limit_draws_more_and_leaves_out_less(plain):
 def test_a_limit_too_low_says_so(monkeypatch):
     monkeypatch.setattr(four_reflections, "MOST_BATCHES", 5)
     assert any("may have been missed" in remark for remark in render(project(limit=1e-6)).remarks)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_limit_whose_quotient_overflows_takes_the_most_batches():
+    tally = four_reflections._Tally()
+    tally.add({"fours": np.array([[7.0, 0.5], [7.0, 0.5]]), "figures": np.full(IN_PICTURE + 2, 10.0)})
+    assert [tally.batches_for(limit) for limit in (1e-320, 5e-324)] == [10**9] * 2
+    assert tally.batches_for(0.01) == ceil(four_reflections.HITS * 0.5 / 0.1)
 
 
 def test_same_side_paths_stay_on_one_side():

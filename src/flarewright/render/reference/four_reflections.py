@@ -177,7 +177,9 @@ class _Tally:
             return self.batches
         # effective flux per ray for the variance of a sum of rays
         ray = squares / flux
-        return max(self.batches, ceil(min(HITS * ray * self.batches / (limit * self.two), 1e9)))
+        needed, least = HITS * ray * self.batches, limit * self.two
+        # the quotient of a tiny limit overflows
+        return max(self.batches, ceil(needed / least) if needed < 1e9 * least else 1_000_000_000)
 
 
 def _is_wanted(path: LightPath, stop_row: int, which: str) -> bool:
