@@ -46,6 +46,7 @@ SHAPES = (
     "{0}-1",
     "\x00",
     "é",
+    "x" * 5000,
 )
 
 # options whose value lets a command run as long as it wants

@@ -33,6 +33,9 @@ def test_every_number_of_a_command_is_tried():
                 ("design identify", "--fstop", "-1"),
             )
         ),
+        # a sentence of 5116 characters, and a traceback
+        ("measure fit", "--by", "x" * 5000),
+        ("looks save", "--name", "x" * 5000),
         # these were noticed after merging, with its result on stdout
         ("measure run", "--every", "4294967296"),
         ("measure run", "--corrections", "x" * 5000),

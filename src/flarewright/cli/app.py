@@ -300,7 +300,8 @@ def _call(words: list[str]) -> int:
     except Exception as error:
         # Usage errors come from Typer's copy of click or from click itself, by version; both have a message.
         if hasattr(error, "format_message"):
-            return _fail(_usage(error))
+            # an error of ours cuts long input
+            return _fail(str(FlarewrightError(_usage(error))))
         if isinstance(error, ImportError | RuntimeError) and _lacks_memory(error):
             return _fail(_no_memory(words))
         # the interpreter's own word for a call from C that failed without a reason

@@ -14,7 +14,7 @@ from flarewright.editor.session.files import project_for_lens
 from flarewright.editor.session.history import committed, started
 from flarewright.editor.session.reach import Reach, files_of, reach_of
 from flarewright.editor.session.session import begin
-from flarewright.errors import FlarewrightError, ProjectError
+from flarewright.errors import FlarewrightError, OutputError, ProjectError
 from flarewright.io.files.state_folder import state_folder
 from flarewright.io.lens.library import lens_path
 from flarewright.io.project.named_files import FIELDS
@@ -48,6 +48,9 @@ def test_the_page_reads_and_writes_under_the_folders_only(session, tmp_path):
     session.do("set_plate", {"values": {"image": str(inside / "grey.png")}})
     session.open(str(inside / "grey.png"))
     assert session.save(str(inside / "shot.toml")).is_file()
+    for nothing in ("", ".", "/"):
+        with pytest.raises(OutputError, match="the project needs a file name"):
+            session.save(nothing)
     before, view = session.project, session.view
     (inside / "link.toml").symlink_to(outside / "lens.toml")
     out = str(outside / "grey.png")

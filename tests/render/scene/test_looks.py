@@ -100,6 +100,16 @@ def test_what_is_taken_from_a_project_is_what_it_says():
         look_of(shot(), "x")
 
 
+def test_a_look_with_a_long_name_or_notes_is_refused():
+    """`looks save` ended in a traceback for a file with a name of 81 characters."""
+    for words, sentence in (
+        (("x" * 81,), "of the look, name should be a text of at most 80 characters, not 81"),
+        (("a", "x" * 401), "of the look, notes should be a text of at most 400 characters, not 401"),
+    ):
+        with pytest.raises(ProjectError, match=sentence):
+            look_of(rich(), *words)
+
+
 @pytest.mark.parametrize("name", shipped_looks())
 def test_looks_that_ship_fit_their_stage_and_other_lenses(name):
     look = read_look(name)

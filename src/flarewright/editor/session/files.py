@@ -232,9 +232,9 @@ def imported(name: str, data: bytes, folder: Path, allowed: Callable[[Project], 
 
 def project_path(text: str) -> Path:
     """Return the path of a project file; `.toml` is added if missing."""
-    if not text.strip():
-        raise OutputError("the project needs a file name, like shot.toml")
     path = expanded(text.strip())
+    if not path.name:
+        raise OutputError("the project needs a file name, like shot.toml")
     return (path if path.suffix.lower() == ".toml" else path.with_name(f"{path.name}.toml")).resolve()
 
 

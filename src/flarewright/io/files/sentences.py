@@ -24,6 +24,7 @@ _EXPECTED = {
     "int_parsing_size": "a whole number of fewer digits",
     "float_type": _NUMBER, "float_parsing": _NUMBER, "finite_number": "a finite number",
     "string_type": _TEXT, "string_unicode": _TEXT, "string_too_short": "a text that is not empty",
+    "string_too_long": "a text of at most {max_length} characters",
     "string_pattern_mismatch": "two rows like 7-3",
     "tuple_type": _LIST, "list_type": _LIST, "set_type": _LIST, "frozen_set_type": _LIST,
     "dict_type": _TABLE, "model_type": _TABLE, "model_attributes_type": _TABLE, "mapping_type": _TABLE,
@@ -114,7 +115,7 @@ def _expected_text(finding: Finding, keys: Keys) -> str:
             return f"a table whose {_tag(about)} is {' or '.join(str(about['expected_tags']).rsplit(', ', 1))}"
         case "union_tag_not_found":
             return f"a table that begins with its {_tag(about)}"
-    return _EXPECTED.get(kind, "something else")
+    return _EXPECTED.get(kind, "something else").format(**about)
 
 
 def _tag(about: dict[str, Any]) -> str:
@@ -125,7 +126,7 @@ def _given_text(finding: Finding) -> str:
     """Return a description of the given value, or "" when it does not help."""
     value = finding["input"]
     match finding["type"]:
-        case "too_short" | "too_long":
+        case "too_short" | "too_long" | "string_too_long":
             return f", not {len(value)}"
         case "union_tag_invalid":
             return f", not {shorten(value[_tag(finding['ctx'])])}"

@@ -5,7 +5,10 @@ from __future__ import annotations
 from os import PathLike
 from typing import Any
 
+from pydantic import ValidationError
+
 from ...errors import ProjectError
+from ...io.files.sentences import validation_sentences
 from ...io.measurement.ghost_model_file import is_ghost_model_file
 from ...io.project.look_file import read_look
 from ...model import Art, Bare, Camera, Everywhere, InTurn, Iris, Light, Look, Preset, Project
@@ -113,7 +116,10 @@ def look_of(project: Project, name: str, notes: str = "") -> tuple[Look, tuple[s
     remarks = []
     if any(getattr(light, key) != getattr(first, key) for light in project.lights for key in LIGHT_KEYS):
         remarks.append("lights differ in colour or size: the look uses those of the first")
-    return Look(name=name, notes=notes, example=project, says=tuple(says)), tuple(remarks)
+    try:
+        return Look(name=name, notes=notes, example=project, says=tuple(says)), tuple(remarks)
+    except ValidationError as error:
+        raise ProjectError(f"of the look, {validation_sentences(error)[0]}") from None
 
 
 def without_lens_rules(art: Art) -> Art:
