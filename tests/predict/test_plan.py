@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import os
 import re
 import threading
 import tomllib
@@ -378,6 +379,11 @@ def test_a_file_of_another_kind_is_not_taken_for_a_damaged_cache(tmp_path):
         (tmp_path / name).write_bytes(data)
         with pytest.raises(FlarewrightError, match="holds no flares"):
             read_cache(tmp_path / name)
+    if hasattr(os, "mkfifo"):
+        # waited for a writer without end
+        os.mkfifo(tmp_path / "pipe.npz")
+        with pytest.raises(FlarewrightError, match="is not a regular file"):
+            read_cache(tmp_path / "pipe.npz")
     np.savez(tmp_path / "other.npz", weights=np.ones(3))
     with pytest.raises(FlarewrightError, match="holds no flares"), remembered(tmp_path / "other.npz"):
         pass

@@ -54,6 +54,8 @@ def read_cache(path: Path, report: Report = lambda _: None) -> Pictures:
                 except Exception:
                     lost += 1
     except FileError:
+        if not path.is_file():
+            raise
         lost += 1
     if lost and not found and not _is_ours(path):
         raise FlarewrightError(f"{path} holds no flares of a prediction; delete it or give another --cache")
