@@ -85,6 +85,8 @@ def test_pixels_of_a_plate_are_those_of_an_anamorphic_lens(folder, lens, said):
         ("--white 0.9", "--white is the scale for --source"),
         ("--source sun", "the brightness of a source needs the scale of the plate: give --white"),
         ("--source moon --white 1", "--source 'moon' is no known lamp; write sun, headlight@METRES"),
+        ("--source sun --white 1e30", "white paper in the sun has no plate value of 1e+30; give one up to 1000000"),
+        ("--threshold 1e30", "the plate has no source above 1e+30; lower --threshold or --stops"),
         ("--plate-transfer log", "--plate-transfer 'log' is unknown; choose srgb, linear, rec709"),
         ("--plate-layer sky", "has no layers"),
         ("--flare-matte none.png", "the matte none.png does not exist"),
@@ -102,6 +104,15 @@ def test_flags_that_do_not_fit_are_refused(capsys, folder, words, sentence):
     err = capsys.readouterr().err
     assert sentence in err.splitlines()[-1]
     assert not list(folder.glob("*.exr"))
+
+
+def test_a_source_brighter_than_a_light_can_be_is_refused(capsys, folder):
+    """It ended in a traceback."""
+    pixels = np.zeros((36, 64, 3), np.float32)
+    pixels[10:12, 20:22] = 1e20
+    OpenEXR.File({}, {"RGB": pixels}).write("hot.exr")
+    assert run(["shot", "hot.exr", *FAST, "--threshold", "1", "--plate-gain", "1e9", "-o", "f.exr"]) == 2
+    assert "a source of the plate is too bright" in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_a_flag_of_a_plate_without_one_is_refused(capsys, folder):

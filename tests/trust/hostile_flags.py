@@ -9,6 +9,7 @@ import shutil
 import tempfile
 from collections.abc import Sequence
 from contextlib import redirect_stderr
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from zipfile import ZipFile
@@ -18,6 +19,7 @@ from PIL import Image
 
 import flarewright as fw
 from flarewright.cli.app import run as run_command
+from flarewright.cli.render.options.plate import CompOptions, PlateOptions
 from flarewright.io.lens.lens_writer import write_lens
 from flarewright.io.measurement.ghost_model_file import write_ghost_model
 from flarewright.io.project.project_text import project_text
@@ -58,6 +60,8 @@ BESIDE: dict[str, tuple[str, ...]] = {
     "--error-of": ("--quality", "reference", "--error", "0.2"), "--order4-limit": ("--orders", "4"),
     "--iso": ("--shutter", "1/250"), "--lux": ("--shutter", "1/250"),
 }  # fmt: skip
+# options of `shot` that need a plate
+OF_PLATE = {f"--{each.name.replace('_', '-')}" for kind in (PlateOptions, CompOptions) for each in fields(kind)}
 PAIRS = 'size_px = [32, 18]\n[lens]\nnames = ["tessar-brendel"]\nstops_down = { uniform = [3, 4] }\n'
 
 
@@ -146,6 +150,8 @@ def run_case(case: Sequence[str]) -> Verdict:
         folder = Path(made) / "work"
         shutil.copytree(prepared(), folder)
         beside = BESIDE.get(flag, ()) if command == "render" else ()
+        if command == "shot" and flag in OF_PLATE:
+            beside = ("flare.exr", *(("--source", "sun") if flag == "--white" else ()))
         words = [*command.split(), *ARGUMENTS[command], *beside, f"{flag}={value}"]
         held, answer = judged(words, folder, endless=flag in ENDLESS or command == "gallery")
     shown = value if len(value) < 40 else f"{value[:30]}... ({len(value)} characters)"

@@ -36,6 +36,9 @@ def test_every_number_of_a_command_is_tried():
         # a sentence of 5116 characters, and a traceback
         ("measure fit", "--by", "x" * 5000),
         ("looks save", "--name", "x" * 5000),
+        # a traceback, and a file left beside the error
+        ("shot", "--white", "1e30"),
+        ("shot", "--threshold", "1e30"),
         # these were noticed after merging, with its result on stdout
         ("measure run", "--every", "4294967296"),
         ("measure run", "--corrections", "x" * 5000),

@@ -12,7 +12,9 @@ from math import degrees, pi
 
 import numpy as np
 
+from ..errors import ProjectError
 from ..model import Light, Rgb
+from ..model.project.animation import LARGEST_INTENSITY
 from ..model.project.light import LEAST_LIGHT_DEG, Rectangle
 from ..render.image.photographic_exposure import SUN_LUX
 from ..render.scene.direct_image import direct_image
@@ -191,6 +193,8 @@ def lights_at(
         intensity = float(rgb @ LUMINANCE)
         if not intensity > 0.0:
             continue
+        if intensity > LARGEST_INTENSITY:
+            raise ProjectError(f"a source of the plate is too bright ({intensity:g}); lower --plate-gain or --white")
         field = np.degrees(np.arctan(slopes[k]))
         shape, diameter = None, 0.0
         if plate.extended[k] and plate.round[k]:

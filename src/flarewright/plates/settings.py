@@ -103,8 +103,8 @@ class PlateSettings:
             raise ProjectError(f"a gain of the plate of {self.gain:g} is none; give a factor above 0")
         if self.highlights is not None and not 1.0 <= self.highlights <= 1e6:
             raise ProjectError(f"highlights up to {self.highlights:g} are not possible; give 1 to 1000000")
-        if self.white is not None and not 0.0 < self.white < float("inf"):
-            raise ProjectError(f"white paper in the sun has no plate value of {self.white:g}; give one above 0")
+        if self.white is not None and not 0.0 < self.white <= 1e6:
+            raise ProjectError(f"white paper in the sun has no plate value of {self.white:g}; give one up to 1000000")
         if self.source is not None and self.white is None:
             raise ProjectError(
                 "the brightness of a source needs the scale of the plate: give --white, the plate value of white "

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..._version import __version__
 from ...errors import FileError, FlarewrightError, ProjectError
-from ...io.files.atomic_write import write_atomically
+from ...io.files.atomic_write import delete_written, write_atomically
 from ...io.files.door import outside_arrays
 from ...io.files.text_file import digest_of
 from ...io.images.plate_picture import PlatePicture
@@ -174,6 +174,9 @@ def plate_shot(
     searched = _searched(search, frames[:1] if still else frames, kept, processes, report, executor)
     found = [Sources.from_table(searched[frames[0] if still else frame]) for frame in frames]
     if not any(len(each) for each in found):
+        if kept is not None:
+            # an error leaves no file
+            delete_written(kept)
         raise ProjectError(
             f"the plate has no source above {threshold:.3g}; lower --threshold or --stops"
             + (", or check the matte" if settings.matte else "")
