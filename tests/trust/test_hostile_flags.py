@@ -39,6 +39,8 @@ def test_every_number_of_a_command_is_tried():
         # a traceback, and a file left beside the error
         ("shot", "--white", "1e30"),
         ("shot", "--threshold", "1e30"),
+        # a core of the starburst that no pixel can be split into was an OverflowError
+        ("shot", "--starburst-size", "1e-308"),
         # these were noticed after merging, with its result on stdout
         ("measure run", "--every", "4294967296"),
         ("measure run", "--corrections", "x" * 5000),

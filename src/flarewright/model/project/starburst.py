@@ -76,7 +76,7 @@ class Starburst(Frozen):
         Clip the pupil by the rims and foreshorten it for the light's field angle. False: the iris alone.
     """
 
-    size: float = Field(1.0, gt=0.0, le=1000.0)
+    size: float = Field(1.0, ge=0.001, le=1000.0)
     intensity: float = Field(1.0, ge=0.0, le=1e9)
     spiral_deg: float = Field(0.0, ge=0.0, le=90.0)
     cats_eye: StrictBool = False
