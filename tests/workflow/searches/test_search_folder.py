@@ -45,3 +45,21 @@ def test_a_cancelled_search_is_whole_in_its_folder_and_resumes(tmp_path, capsys)
 
 def test_a_new_folder_starts_a_search(tmp_path):
     assert search_to_resume(tmp_path / "new", project(), 5) == PoolState(5)
+
+
+def test_two_searches_at_once_do_not_share_a_folder(tmp_path):
+    """The second one began before the first was stored, and both wrote the same files."""
+    folder, refused = tmp_path / "found", []
+
+    def meanwhile(_state):
+        with pytest.raises(OutputError, match="another process searches into "):
+            search_in_folder(project(), folder, PoolState(4), SearchLimits(searches=4, lenses=1))
+        refused.append(True)
+
+    search_in_folder(
+        project(), folder, PoolState(3), SearchLimits(searches=1000, lenses=1), cancelled=lambda: bool(refused),
+        display=lambda unit: nullcontext(meanwhile),
+    )  # fmt: skip
+    assert refused
+    assert not (folder / ".search.lock").exists()
+    assert search_to_resume(folder, project(), 3).seed == 3

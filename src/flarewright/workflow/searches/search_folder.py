@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import FlarewrightError, OutputError
 from ...io.files.atomic_write import make_folder
+from ...io.files.file_lock import held
 from ...typing import Report
 from ..checkpoints import checkpoints
 from .lens_search import LensSearch, search_lenses
@@ -89,15 +90,16 @@ def search_in_folder(
     ProjectError
         As `search_lenses`.
     OutputError
-        When a file cannot be written at the end.
+        When another process searches into the folder, or a file cannot be written at the end.
     """
     from ...design.results.report import search_summary, write_folder
 
-    with ExitStack() as watching:
+    with ExitStack() as owning, ExitStack() as watching:
 
         def observer(unit: str) -> Observer:
             # the project is valid by now, and the search starts
             make_folder(folder)
+            owning.enter_context(_owned(folder))
             show = watching.enter_context(display(unit))
             return watching.enter_context(_stored(project, folder, state, name, sharing is not None, show, report))
 
@@ -106,14 +108,37 @@ def search_in_folder(
             threads=limits.threads, choice=choice, measure=measure, name=name, report=report, progress=observer,
             cancelled=cancelled, sharing=sharing,
         )  # fmt: skip
-    cut_off = cancelled()
-    remarks = write_folder(
-        folder, project, done.problem, done.state, done.outcomes, done.obstacles, done.conflict, name
-    )
+        watching.close()
+        cut_off = cancelled()
+        remarks = write_folder(
+            folder, project, done.problem, done.state, done.outcomes, done.obstacles, done.conflict, name
+        )
     # a name belongs to lenses that do not come from the project's lens
     about = done.settled.remarks if name is None else ()
     summary = search_summary(done.state, done.outcomes, done.problem, done.obstacles, done.conflict)
     return FolderSearch(done, summary, (*about, *remarks), cut_off)
+
+
+@contextmanager
+def _owned(folder: Path) -> Iterator[None]:
+    """Refuse a folder into which another process searches, until the block ends: both would write the same files."""
+    path = folder / ".search.lock"
+    try:
+        file = path.open("wb")
+    except OSError:
+        # a full disk does not end a search
+        yield
+        return
+    with file:
+        if not held(file):
+            raise OutputError(f"another process searches into {folder}; wait for it, or choose another folder")
+        try:
+            yield
+        finally:
+            # Windows deletes no open file
+            file.close()
+            with suppress(OSError):
+                path.unlink()
 
 
 @contextmanager
