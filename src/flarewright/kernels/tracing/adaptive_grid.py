@@ -293,13 +293,13 @@ def build_mesh(steps, lens, light, crossings, iris, box, coarse, limits):
     for k in range(halved.size):
         halved[k] = 0
     # levels and numbers of cells to classify: the coarsest, then quarters of left-out cells that light enters
-    begun, n_begun = np.empty((nx * ny, 2), dtype=np.int64), nx * ny
+    entered, n_entered = np.empty((nx * ny, 2), dtype=np.int64), nx * ny
     for k in range(nx * ny):
-        begun[k, 0], begun[k, 1] = 0, k
+        entered[k, 0], entered[k, 1] = 0, k
     beside_light = False
-    while n_begun > 0:
-        start, n_start = begun, n_begun
-        begun, n_begun = np.empty((64, 2), dtype=np.int64), 0
+    while n_entered > 0:
+        start, n_start = entered, n_entered
+        entered, n_entered = np.empty((64, 2), dtype=np.int64), 0
         children, n_children = np.empty(0, dtype=np.int64), 0
         for level in range(max_level + 1):
             cells = _with_started(children, n_children, start, n_start, level)
@@ -340,11 +340,11 @@ def build_mesh(steps, lens, light, crossings, iris, box, coarse, limits):
                         n_children += 1
             for cell in cells:
                 if state[offsets[level] + cell] == LEAF or state[offsets[level] + cell] == FLAT:
-                    begun, n_begun = halve_neighbours(
-                        state, offsets, data, lattice, cell, level, depth, nx, ny, crossings, iris[0], limits, begun,
-                        n_begun,
+                    entered, n_entered = halve_neighbours(
+                        state, offsets, data, lattice, cell, level, depth, nx, ny, crossings, iris[0], limits, entered,
+                        n_entered,
                     )  # fmt: skip
-        halved[NEAR_RIM] += n_begun // 4
+        halved[NEAR_RIM] += n_entered // 4
         beside_light = True
     _balance(state, offsets, nx, ny, depth)
     first = n_nodes

@@ -54,7 +54,7 @@ def has_lit_side(data, lattice, a, b, level, depth, crossings, iris_radius, limi
 
 @inner
 def halve_neighbours(
-    state, offsets, data, lattice, cell, level, depth, nx, ny, crossings, iris_radius, limits, begun, n_begun
+    state, offsets, data, lattice, cell, level, depth, nx, ny, crossings, iris_radius, limits, entered, n_entered
 ):
     """Halve the coarser left-out cells that share a lit node with a leaf.
 
@@ -72,13 +72,13 @@ def halve_neighbours(
         Number of coarsest cells in x and in y.
     data, lattice, depth, crossings, iris_radius, limits
         As in `has_lit_side`.
-    begun : ndarray of int, shape (>= n_begun, 2)
+    entered : ndarray of int, shape (>= n_entered, 2)
         Levels and numbers of cells to classify, to which those of the quarters are added.
-    n_begun : int
+    n_entered : int
 
     Returns
     -------
-    begun, n_begun
+    entered, n_entered
         A longer array if the quarters need it.
     """
     width, height = nx << level, ny << level
@@ -100,14 +100,14 @@ def halve_neighbours(
             if not _is_lit(data, node, crossings, iris_radius, limits):
                 continue
             state[offsets[up] + i * (ny << up) + j] = SPLIT
-            if n_begun + 4 > begun.shape[0]:
-                begun = _longer(begun, n_begun)
+            if n_entered + 4 > entered.shape[0]:
+                entered = _longer(entered, n_entered)
             for q in range(4):
-                begun[n_begun, 0] = up + 1
-                begun[n_begun, 1] = (2 * i + q // 2) * (2 * (ny << up)) + 2 * j + q % 2
-                n_begun += 1
+                entered[n_entered, 0] = up + 1
+                entered[n_entered, 1] = (2 * i + q // 2) * (2 * (ny << up)) + 2 * j + q % 2
+                n_entered += 1
             break
-    return begun, n_begun
+    return entered, n_entered
 
 
 @inner
