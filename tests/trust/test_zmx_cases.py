@@ -236,6 +236,17 @@ def test_broken_words_are_one_short_sentence(read, before, after, words):
     assert len(message) < 400
 
 
+@pytest.mark.parametrize(
+    ("number", "said"), [("1", "is numbered '1'"), ("7", "is numbered '7'"), ("", "is not numbered")]
+)
+def test_a_surface_with_another_number_is_reported(read, number, said):
+    """Pickups and configurations refer to surfaces by number, so the order of the file may not be the right one."""
+    lens, remarks = read(singlet().replace("SURF 2", f"SURF {number}"))
+    assert first_order(lens).efl == first_order(read(singlet())[0]).efl
+    assert f"surface 2 {said} in the file; surfaces are counted in their order, from 0" in remarks
+    assert "numbered" not in read(singlet())[1]
+
+
 def test_a_mode_without_a_word_is_the_usual_one(read):
     assert first_order(read(singlet().replace("MODE SEQ", "MODE"))[0]).efl > 0.0
 

@@ -61,8 +61,8 @@ class Text:
 
 
 def grouped(text: str) -> Text:
-    """Group the lines of a file; decimal commas become a remark, and broken lines of PARM or XDAT problems."""
-    found = Text()
+    """Group the lines of a file; decimal commas and wrong numbers become remarks, broken PARM or XDAT problems."""
+    found, misnumbered = Text(), ""
     for line in text.splitlines():
         words = line.split()
         if not words:
@@ -71,7 +71,11 @@ def grouped(text: str) -> Text:
         if key not in TEXTS:
             words = _with_points(words, found)
         if key == "SURF":
-            found.blocks.append(Block(len(found.blocks)))
+            number = len(found.blocks)
+            if words[1:2] != [str(number)] and not misnumbered:
+                given = f"numbered {shorten(' '.join(words[1:]))}" if words[1:] else "not numbered"
+                misnumbered = f"surface {number} is {given} in the file"
+            found.blocks.append(Block(number))
         elif not line[0].isspace():
             # the header, or lines after the last surface
             if key == "NOTE":
@@ -86,6 +90,8 @@ def grouped(text: str) -> Text:
             found.head.setdefault(key, line.split(maxsplit=1)[1:] if key == "NAME" else words[1:])
         elif found.blocks:
             _of_surface(found.blocks[-1], key, words[1:], found)
+    if misnumbered:
+        found.remarks.append(f"{misnumbered}; surfaces are counted in their order, from 0")
     if found.commas:
         found.remarks.append(f"{count(found.commas, 'number')} with a decimal comma, read as a decimal point")
     return found
