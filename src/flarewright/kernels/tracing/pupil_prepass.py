@@ -12,7 +12,7 @@ from .sequential import ALIVE, REL, STOP, STOP_X, WEIGHT, X, Y, trace_lanes
 
 # a path that passes light in fewer pre-pass cells than this is searched for spots between the samples
 FEW_CELLS = 12
-# most samples per side of a searched cell; on the mirror axis as many between two samples
+# most samples per side of a searched cell
 PROBES = 8
 # number of cells searched if every ray ends in the lens
 LATE_CELLS = 32
@@ -165,7 +165,11 @@ def find_box(steps, lens, light, crossings, iris_radius, view_radius, box, cells
         samples = Samples(px, py, data, width, hx, hy)
         _search_gaps(steps, lens, light, crossings, iris_radius, samples, accepted < few_cells, spots, sums)
         if accepted == 0 and few_cells == FEW_CELLS and spots[1] < spots[0] and box[0] == 0.0:
-            _search_axis(steps, lens, light, crossings, iris_radius, samples, ny, spots, sums)
+            # a spot that is not one of a pair lies on the mirror axis, even where all rays beside it end at one surface
+            axis = np.empty((ny, 2))
+            for b in range(ny):
+                axis[b, 0], axis[b, 1] = 0.0, box[2] + b * hy
+            _search_cells(steps, lens, light, crossings, iris_radius, axis, hx / PROBES, hy, 1, PROBES, spots, sums)
         for m in range(2):
             spots[2 * m] = max(spots[2 * m], box[2 * m])
             spots[2 * m + 1] = min(spots[2 * m + 1], box[2 * m + 1])
@@ -299,7 +303,7 @@ def _samples_per_side(step, finest):
 
 @inner
 def _search_cells(steps, lens, light, crossings, iris_radius, corners, hx, hy, across, along, spots, sums):
-    """Trace `across` x `along` rays in each doubtful cell and add the passing ones to `spots` and `sums`.
+    """Trace `across` x `along` rays in each cell and add the passing ones to `spots` and `sums`.
 
     Cells at the mirror axis x = 0 have rays on it: a spot that is not one of a pair is widest there.
     """
@@ -315,24 +319,6 @@ def _search_cells(steps, lens, light, crossings, iris_radius, corners, hx, hy, a
     for k in range(px.size):
         if _passes(data, k, crossings, iris_radius):
             _add_spot(spots, sums, data, k, px[k], py[k], hx / across, hy / along, hx * hy / each * np.cos(light.tilt))
-
-
-@inner
-def _search_axis(steps, lens, light, crossings, iris_radius, samples, ny, spots, sums):
-    """Trace PROBES rays between every two samples on the mirror axis and add the passing ones to `spots` and `sums`.
-
-    A spot that is not one of a pair lies on the axis, even where all rays around it end at the same surface.
-    """
-    hx, hy = samples.hx, samples.hy
-    px, py = np.empty(ny * PROBES), np.empty(ny * PROBES)
-    for k in range(px.size):
-        px[k], py[k] = 0.0, samples.py[0] + (k + 0.5) * hy / PROBES
-    data = np.empty((px.size, STOP_X + 2 * crossings))
-    trace_lanes(steps, lens, light, px, py, data)
-    share = hx * hy / (PROBES * PROBES) * np.cos(light.tilt)
-    for k in range(px.size):
-        if _passes(data, k, crossings, iris_radius):
-            _add_spot(spots, sums, data, k, px[k], py[k], hx / PROBES, hy / PROBES, share)
 
 
 @inner
