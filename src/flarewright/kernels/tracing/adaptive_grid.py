@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..jit.decorators import borrowing, compiled, inlined, inner
-from .cell_neighbours import EMPTY, FLAT, LEAF, SPLIT, UNKNOWN, halve_neighbours, has_lit_side
+from .cell_neighbours import EMPTY, FLAT, LEAF, SPLIT, UNKNOWN, halve_neighbours, has_lit_side, known_level, quarter_of
 from .lens_arrays import at_wavelength
 from .pupil_prepass import rejected
 from .sequential import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_lanes
@@ -336,7 +336,7 @@ def build_mesh(steps, lens, light, crossings, iris, box, coarse, limits):
                 state[offsets[level] + cell] = verdict
                 if verdict == SPLIT:
                     for m in range(4):
-                        children[n_children] = (2 * a + m // 2) * (2 * height) + 2 * b + m % 2
+                        children[n_children] = quarter_of(a, b, height, m)
                         n_children += 1
             for cell in cells:
                 if state[offsets[level] + cell] == LEAF or state[offsets[level] + cell] == FLAT:
@@ -481,11 +481,8 @@ def _balance(state, offsets, nx, ny, depth):
 
 @borrowing
 def _split_down_to(state, offsets, ny, level, a, b):
-    """Create a cell by splitting the leaf that covers it, if there is one."""
-    # find the ancestor with a known state, then split downwards
-    up = level
-    while up >= 0 and state[offsets[up] + (a >> (level - up)) * (ny << up) + (b >> (level - up))] == UNKNOWN:
-        up -= 1
+    """Create a cell by splitting the leaf that covers it downwards, if there is one."""
+    up = known_level(state, offsets, ny, level, a, b)
     if up < 0 or up == level:
         return
     kind = state[offsets[up] + (a >> (level - up)) * (ny << up) + (b >> (level - up))]
@@ -495,8 +492,7 @@ def _split_down_to(state, offsets, ny, level, a, b):
         i, j = a >> (level - mid), b >> (level - mid)
         state[offsets[mid] + i * (ny << mid) + j] = SPLIT
         for m in range(4):
-            child = (2 * i + m // 2) * (ny << (mid + 1)) + 2 * j + m % 2
-            state[offsets[mid + 1] + child] = kind
+            state[offsets[mid + 1] + quarter_of(i, j, ny << mid, m)] = kind
 
 
 @inner

@@ -3,10 +3,26 @@
 import numpy as np
 
 from ..jit.decorators import borrowing, inner
-from .sequential import ALIVE, REL, STOP_X, X, Y
+from .pupil_prepass import passes
+from .sequential import X, Y
 
 # states of a grid's cells; a FLAT leaf is drawn without the midpoints of its edges, a LEAF with them
 UNKNOWN, LEAF, SPLIT, EMPTY, FLAT = 0, 1, 2, 3, 4
+
+
+@borrowing
+def quarter_of(a, b, height, m):
+    """Return the number, among the cells of the next level, of the m-th quarter of a cell; `height` cells are in b."""
+    return (2 * a + m // 2) * (2 * height) + 2 * b + m % 2
+
+
+@borrowing
+def known_level(state, offsets, ny, level, a, b):
+    """Return the level of the finest cell with a known state that covers the cell a, b of a level; -1 for none."""
+    up = level
+    while up >= 0 and state[offsets[up] + (a >> (level - up)) * (ny << up) + (b >> (level - up))] == UNKNOWN:
+        up -= 1
+    return up
 
 
 @borrowing
@@ -14,13 +30,8 @@ def _is_lit(data, k, crossings, iris_radius, limits):
     """Return whether a node's ray passes at any wavelength and lands in the picture."""
     radius = min(iris_radius, limits.faint_radius)
     for v in range(data.shape[0]):
-        ray = data[v, k]
-        if ray[ALIVE] == 0.0 or ray[REL] > 1.0 or ray[X] * ray[X] + ray[Y] * ray[Y] > limits.view_radius**2:
-            continue
-        outside = False
-        for at in range(STOP_X, STOP_X + 2 * crossings, 2):
-            outside = outside or ray[at] * ray[at] + ray[at + 1] * ray[at + 1] > radius * radius
-        if not outside:
+        x, y = data[v, k, X], data[v, k, Y]
+        if x * x + y * y <= limits.view_radius**2 and passes(data[v], k, crossings, radius):
             return True
     return False
 
@@ -87,13 +98,11 @@ def halve_neighbours(
     for m in range(4):
         da, db = (1 if m == 0 else (-1 if m == 1 else 0)), (1 if m == 2 else (-1 if m == 3 else 0))
         i, j = a + da, b + db
-        if not (0 <= i < width and 0 <= j < height) or state[offsets[level] + i * height + j] != UNKNOWN:
+        if not (0 <= i < width and 0 <= j < height):
             continue
-        up = level - 1
-        while up > 0 and state[offsets[up] + (i >> (level - up)) * (ny << up) + (j >> (level - up))] == UNKNOWN:
-            up -= 1
+        up = known_level(state, offsets, ny, level, i, j)
         i, j = i >> (level - up), j >> (level - up)
-        if state[offsets[up] + i * (ny << up) + j] != EMPTY:
+        if up == level or state[offsets[up] + i * (ny << up) + j] != EMPTY:
             continue
         for n in range(-1, 2):
             node = lattice[(2 * a + 1 + (da if da != 0 else n)) * half, (2 * b + 1 + (db if db != 0 else n)) * half] - 1
@@ -103,8 +112,7 @@ def halve_neighbours(
             if n_entered + 4 > entered.shape[0]:
                 entered = _longer(entered, n_entered)
             for q in range(4):
-                entered[n_entered, 0] = up + 1
-                entered[n_entered, 1] = (2 * i + q // 2) * (2 * (ny << up)) + 2 * j + q % 2
+                entered[n_entered, 0], entered[n_entered, 1] = up + 1, quarter_of(i, j, ny << up, q)
                 n_entered += 1
             break
     return entered, n_entered

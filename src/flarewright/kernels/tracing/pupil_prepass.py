@@ -176,7 +176,7 @@ def find_box(steps, lens, light, crossings, iris_radius, view_radius, box, cells
             found[2 * m] = min(found[2 * m], spots[2 * m])
             found[2 * m + 1] = max(found[2 * m + 1], spots[2 * m + 1])
     for k in range(count):
-        if _passes(data, k, crossings, iris_radius):
+        if passes(data, k, crossings, iris_radius):
             sums[5] += hx * hy
     # the pre-pass uses one wavelength and linear cells: add a margin of one cell
     for m in range(2):
@@ -275,7 +275,7 @@ def _is_doubtful_cell(data, nodes, nx, ny, crossings, iris_radius, late):
 
 
 @borrowing
-def _passes(data, k, crossings, iris_radius):
+def passes(data, k, crossings, iris_radius):
     """Return whether a ray passes every rim, and the circle around the iris at each crossing."""
     if data[k, ALIVE] == 0.0 or data[k, REL] > RIM:
         return False
@@ -317,7 +317,7 @@ def _search_cells(steps, lens, light, crossings, iris_radius, corners, hx, hy, a
     data = np.empty((px.size, STOP_X + 2 * crossings))
     trace_lanes(steps, lens, light, px, py, data)
     for k in range(px.size):
-        if _passes(data, k, crossings, iris_radius):
+        if passes(data, k, crossings, iris_radius):
             _add_spot(spots, sums, data, k, px[k], py[k], hx / across, hy / along, hx * hy / each * np.cos(light.tilt))
 
 
@@ -352,7 +352,7 @@ def _search_gaps(steps, lens, light, crossings, iris_radius, samples, few, spots
         narrower = np.empty((2 * n_gaps, 6))
         count = 0
         for k in range(n_gaps):
-            if _passes(middle, k, crossings, iris_radius):
+            if passes(middle, k, crossings, iris_radius):
                 _add_spot(spots, sums, middle, k, mx[k], my[k], hx / PROBES, hy / PROBES, share)
                 continue
             end = _end(middle, k)
@@ -381,7 +381,7 @@ def _is_doubtful_gap(data, a, b, before, crossings, iris_radius, few):
     low, high = min(data[a, REL], data[b, REL]), max(data[a, REL], data[b, REL])
     if low > NEAR and not (few and not _outside(low, high, 0.5)):
         return False
-    if _passes(data, a, crossings, iris_radius) or _passes(data, b, crossings, iris_radius):
+    if passes(data, a, crossings, iris_radius) or passes(data, b, crossings, iris_radius):
         return False
     for k in (a, b):
         # the ray ended in front of the iris, so its place there is unknown
