@@ -94,21 +94,21 @@ def search_in_folder(
     """
     from ...design.results.report import search_summary, write_folder
 
-    with ExitStack() as owning, ExitStack() as watching:
+    with ExitStack() as owning:
+        with ExitStack() as watching:
 
-        def observer(unit: str) -> Observer:
-            # the project is valid by now, and the search starts
-            make_folder(folder)
-            owning.enter_context(_owned(folder))
-            show = watching.enter_context(display(unit))
-            return watching.enter_context(_stored(project, folder, state, name, sharing is not None, show, report))
+            def observer(unit: str) -> Observer:
+                # the project is valid by now, and the search starts
+                make_folder(folder)
+                owning.enter_context(_owned(folder))
+                show = watching.enter_context(display(unit))
+                return watching.enter_context(_stored(project, folder, state, name, sharing is not None, show, report))
 
-        done = search_lenses(
-            project, time_s=limits.time_s, state=state, lenses=limits.lenses, searches=limits.searches,
-            threads=limits.threads, choice=choice, measure=measure, name=name, report=report, progress=observer,
-            cancelled=cancelled, sharing=sharing,
-        )  # fmt: skip
-        watching.close()
+            done = search_lenses(
+                project, time_s=limits.time_s, state=state, lenses=limits.lenses, searches=limits.searches,
+                threads=limits.threads, choice=choice, measure=measure, name=name, report=report, progress=observer,
+                cancelled=cancelled, sharing=sharing,
+            )  # fmt: skip
         cut_off = cancelled()
         remarks = write_folder(
             folder, project, done.problem, done.state, done.outcomes, done.obstacles, done.conflict, name
