@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from flarewright.errors import ProjectError
 from flarewright.model import Light
-from flarewright.optics.pupil.light_shape import parts
+from flarewright.optics.pupil.light_shape import disc_fits, parts
 
 
 def test_a_wide_light_has_at_most_the_wanted_parts_which_share_all_of_it():
@@ -18,3 +19,10 @@ def test_a_wide_light_has_at_most_the_wanted_parts_which_share_all_of_it():
     assert len(parts(Light(field_deg=(3.0, -2.0), diameter_deg=3.0), 2.0, 4)) == len(
         parts(Light(field_deg=(3.0, -2.0), diameter_deg=3.0), 2.0)
     )
+
+
+def test_a_disc_beyond_the_front_says_where_it_lies():
+    light = Light(field_deg=(88.0, 0.0), diameter_deg=4.0)
+    assert not disc_fits(light)
+    with pytest.raises(ProjectError, match=r"lies 88 degrees .*, and its disc of 4 degrees reaches beyond 89"):
+        parts(light, 1.0)

@@ -72,3 +72,13 @@ def test_spikes_taper_from_a_round_core(name, spikes):
         widths.append(radius_px * seen.mean())
     assert max(widths) < 1.2 * widths[0]
     assert widths[0] > widths[2] > 1.3 * widths[3]
+
+
+def test_a_light_at_the_border_of_the_front_stays_a_point():
+    edge, inner = Light(field_deg=(88.9, 0.0)), Light(field_deg=(80.0, 0.0))
+    filled, reported = as_photographed(Project(lens="fisheye-nikkor-10.5", lights=(edge, inner)))
+    assert [light.diameter_deg for light in filled.lights] == [0.0, LIGHT_DEG]
+    assert reported[-1] == "lights of 0.25 degrees"
+    filled, reported = as_photographed(Project(lens="fisheye-nikkor-10.5", lights=(edge,)))
+    assert filled.lights == (edge,)
+    assert not any("lights of" in each for each in reported)

@@ -95,22 +95,33 @@ def _crosses_itself(corners: Floats) -> bool:
     return bool((apart & apart.T).any())
 
 
+def disc_fits(light: Light) -> bool:
+    """Return whether a round light lies within `WIDEST_DEG` of the axis."""
+    slopes = (tan(radians(angle)) for angle in light.field_deg)
+    return atan(hypot(*slopes)) + _disc_radius(light) <= radians(WIDEST_DEG)
+
+
+def _disc_radius(light: Light) -> float:
+    """Return the angle from the centre to the corners of a polygon of the disc's area, rad."""
+    step = 2.0 * pi / ROUND
+    return float(radians(0.5 * light.diameter_deg) * (step / sin(step)) ** 0.5)
+
+
 def _disc(light: Light) -> Floats:
     """Return directions half the diameter from the centre, as a polygon of the disc's area."""
-    step = 2.0 * pi / ROUND
-    half = radians(0.5 * light.diameter_deg) * (step / sin(step)) ** 0.5
+    half = _disc_radius(light)
     slopes = [tan(radians(angle)) for angle in light.field_deg]
-    if atan(hypot(*slopes)) + half > radians(WIDEST_DEG):
+    if not disc_fits(light):
         raise ProjectError(
-            f"the light {light.name!r} reaches beside or behind the camera; its disc must stay within "
-            f"{WIDEST_DEG:g} degrees"
+            f"the light {light.name!r} lies {degrees(atan(hypot(*slopes))):g} degrees from the axis, and its disc of "
+            f"{light.diameter_deg:g} degrees reaches beyond {WIDEST_DEG:g}; move it inwards, or make it a point"
         )
     middle = np.array([*slopes, 1.0])
     middle /= np.linalg.norm(middle)
     across = np.cross([0.0, 1.0, 0.0], middle)
     across /= np.linalg.norm(across)
     up = np.cross(middle, across)
-    angle = step * np.arange(ROUND)
+    angle = 2.0 * pi / ROUND * np.arange(ROUND)
     rim = cos(half) * middle + sin(half) * (np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * up)
     return np.asarray(rim[:, :2] / rim[:, 2:])
 

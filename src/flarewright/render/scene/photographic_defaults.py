@@ -10,6 +10,7 @@ from collections.abc import Set as AbstractSet
 
 from ...io.lens.library import in_library, lens_path
 from ...model import Iris, Lens, Light, Preset, Project
+from ...optics.pupil.light_shape import disc_fits
 from ...optics.rays.pack import PERIOD, STAGGERED
 from .resolve import open_lens
 
@@ -74,8 +75,11 @@ def as_photographed(project: Project, said: AbstractSet[str] = frozenset()) -> t
             reported.append(f"edges rough by {ROUGHNESS_UM:g} um")
         changes["iris"] = iris.replace(**roughened)
     if "lights" not in said and all(_point(light) for light in project.lights):
-        changes["lights"] = tuple(light.replace(diameter_deg=LIGHT_DEG) for light in project.lights)
-        reported.append(f"lights of {LIGHT_DEG:g} degrees")
+        sized = (light.replace(diameter_deg=LIGHT_DEG) for light in project.lights)
+        # a light at the border of the front half-space stays a point
+        changes["lights"] = tuple(wide if disc_fits(wide) else wide.replace(diameter_deg=0.0) for wide in sized)
+        if changes["lights"] != project.lights:
+            reported.append(f"lights of {LIGHT_DEG:g} degrees")
     filled: Project = project.replace(**changes) if changes else project
     return filled, tuple(reported)
 
