@@ -62,6 +62,13 @@ class ProjectError(FlarewrightError):
     """A project file or a combination of options that cannot be rendered."""
 
 
+class RecordError(ProjectError, ValueError):
+    """A record made with impossible values; `problems` lists every field.
+
+    It is a ValueError, so that pydantic reports it as an error of the record around it.
+    """
+
+
 class OutputError(FlarewrightError):
     """A file that could not be written; no partial file remains."""
 

@@ -404,7 +404,7 @@ def _usage(error: Any) -> str:
     cause = error.__cause__
     if hasattr(cause, "errors"):
         # newer releases of Typer validate values with pydantic
-        from ..io.files.sentences import validation_sentences
+        from ..sentences import validation_sentences
 
         message = f"{message.partition(': ')[0]}: {validation_sentences(cause)[0]}"
     for theirs, ours in _TYPES.items():

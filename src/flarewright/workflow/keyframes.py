@@ -8,12 +8,12 @@ from math import fmod
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from ..errors import ProjectError
 from ..io.project.project_file import validation_messages
 from ..model import BlackBody, Iris, Light, Project, Rgb, Timeline
 from ..model.project.animation import Curve, Motion
+from ..sentences import INVALID
 
 
 def value_at(at_s: float, times_s: Sequence[float], values: Sequence[float], motion: Motion = "linear") -> float:
@@ -110,7 +110,7 @@ def project_at(project: Project, at_s: float) -> Project:
     try:
         changes["lights"] = tuple(light_at(light, at_s) for light in project.lights)
         placed: Project = project.replace(**changes)
-    except ValidationError as error:
+    except INVALID as error:
         raise ProjectError(f"at {at_s:g} s: {validation_messages(error, changes)[0]}") from None
     return placed
 

@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 
 from ..errors import FlarewrightError
-from ..io.files.sentences import count
 from ..io.measurement.ghost_model_file import (
     read_corrections,
     read_ghost_model,
@@ -32,6 +31,7 @@ from ..model.measurement.capture import OF_LIGHT, MergedRun
 from ..model.measurement.corrections import Corrections
 from ..model.measurement.ghost_model import GhostModel
 from ..model.measurement.ghost_tracks import Tracks
+from ..sentences import count
 from ..typing import Progress, Report
 from .measure_provenance import COMPACT, FOUND, MODEL, STAGES, TRACKS, as_measured, note_source
 

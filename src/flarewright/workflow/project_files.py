@@ -30,7 +30,6 @@ def open_project_files(file: Path, project: Project) -> ResolvedProject:
     FlarewrightError
         With all errors of the project.
     """
-    from ..io.files.sentences import summary
     from ..io.images.mask_image import read_mask
     from ..optics.rays.pack import resolve_coatings
     from ..render.scattering.scatter_pass import check_scatter
@@ -38,6 +37,7 @@ def open_project_files(file: Path, project: Project) -> ResolvedProject:
     from ..render.scene.holdout import read_plates
     from ..render.scene.resolve import resolve_project
     from ..render.starburst.starburst_pass import read_soil
+    from ..sentences import summary
 
     settled = resolve_project(project)
     project, mask = settled.project, settled.iris.mask

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import FlarewrightError, ProjectError, naming
-from ..io.files.sentences import summary
 from ..optics.lens.dispersion import D_LINE_NM
 from ..predict.plan import Plan, Ranked, plan_scene, ranking
 from ..predict.scene_data import scene_data
@@ -20,6 +19,7 @@ from ..predict.search import BestPosition, best_position
 from ..predict.switching import Shot, choose_cameras
 from ..predict.worst import Worst, render_worst
 from ..render.scattering.veiling_glare import VeilingGlare, veiling_glare
+from ..sentences import summary
 from .flare_pictures import pictures_elsewhere
 from .lens_flares import camera_project, scene_flare
 from .scene_check import light_errors

@@ -6,8 +6,8 @@ from typing import cast
 import numpy as np
 import pytest
 from planted_run import LARGEST, shape, views
-from pydantic import ValidationError
 
+from flarewright.errors import RecordError
 from flarewright.kernels.ghost_model.pupil_mesh import SOFT
 from flarewright.measure.core.parameter_vector import field, frame
 from flarewright.measure.fitting.alternating_fit import to_model
@@ -219,5 +219,5 @@ def test_without_its_ghost_and_beyond_its_pictures_a_blob_is_not_drawn(run):
 
 @pytest.mark.parametrize("given", [{"ghost": None}, {"follows": "axis"}])
 def test_a_sprite_names_its_ghost_if_it_follows_one(given):
-    with pytest.raises(ValidationError, match="names a ghost if it follows"):
+    with pytest.raises(RecordError, match="names a ghost if it follows"):
         sprite(**given)

@@ -89,17 +89,13 @@ def test_a_project_says_who_reads_texts():
         fw.ProjectError, match=r"one of uncoated.*; flarewright\.parse_coating_choice\('preset:nosuch'\) reads"
     ):
         fw.Project(coating="preset:nosuch")
-    with pytest.raises(
-        fw.ProjectError, match="'nosuch' is no standard coating; use one of uncoated-1930s, single-1950s"
-    ):
-        fw.Standard("nosuch")
 
 
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
         ({}, "no light is given"),
-        ({"lights": LIGHTS, "coatin": "none"}, "coatin is not a known key; did you mean 'coating'"),
+        ({"lights": LIGHTS, "coatin": "none"}, "coatin is not a known field; did you mean 'coating'"),
         ({"lights": LIGHTS, "coating": 5}, "coating 5 is neither a text nor a coating: write none"),
         ({"lights": LIGHTS, "f_number": -1.0}, "f_number should be greater than 0.3, not -1"),
         ({"lights": LIGHTS, "f_number": -1.0, "zoom": -1.0}, "2 problems"),
@@ -108,6 +104,14 @@ def test_a_project_says_who_reads_texts():
 def test_settings_that_cannot_be_used(settings, words):
     with pytest.raises(fw.ProjectError, match=words):
         fw.render("canon-28-80", **settings)
+
+
+def test_a_word_of_quality_keeps_the_other_settings_as_the_command_line_does():
+    given = project_of("canon-28-80", lights=LIGHTS, quality=fw.Quality(wavelengths=9))
+    assert project_of(given, quality="draft").quality == fw.Quality(mode="draft", wavelengths=9)
+    assert project_of("canon-28-80", lights=LIGHTS, quality="draft").quality == fw.Quality(mode="draft")
+    with pytest.raises(fw.ProjectError, match="'draft', 'final' or 'reference', not 'drafty'"):
+        fw.render("canon-28-80", lights=LIGHTS, quality="drafty")
 
 
 def test_the_settings_are_rendered():

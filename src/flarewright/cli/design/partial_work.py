@@ -28,8 +28,8 @@ def partial_work(output: Path | None, inputs: Sequence[Any], part: str, parts: s
     part, parts : str
         Name of a finished part, for the remark on resuming.
     """
-    from ...io.files.sentences import count
     from ...measure.core.checkpoint import Journal, journal
+    from ...sentences import count
 
     if output is None:
         yield Journal()

@@ -149,7 +149,7 @@ def print_search(folder: Path, found: FolderSearch, as_json: bool) -> None:
     if as_json:
         print_json({"folder": str(folder), **found.summary})
         return
-    from ...io.files.sentences import count
+    from ...sentences import count
 
     search, verdict = found.search, found.summary["verdict"]
     lenses = count(len(search.outcomes), "lens", "lenses")

@@ -101,7 +101,7 @@ def _print(found: Addition) -> None:
 
 
 def _summary(found: Addition) -> str:
-    from ...io.files.sentences import count
+    from ...sentences import count
 
     parts = [f"{count(len(found.added), 'lens', 'lenses')} added"]
     parts += [f"{len(found.known)} known already"] if found.known else []

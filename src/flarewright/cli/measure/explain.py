@@ -52,8 +52,8 @@ def explain(
     if output.exists() and not output.is_dir():
         raise OutputError(f"{output} is a file; give a folder for the lenses")
     from ...design.results.explain import explain_misfit
-    from ...io.files.sentences import count
     from ...io.measurement.ghost_model_file import read_ghost_model
+    from ...sentences import count
     from ...workflow.searches.flare_targets import busiest_constellation, project_of_model
     from ...workflow.searches.search_folder import SearchLimits, search_to_resume
 

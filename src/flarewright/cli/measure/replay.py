@@ -43,13 +43,13 @@ def replay(
 ) -> None:
     """Render a measured flare as layers of an EXR file."""
     check_place(output, ".exr")
-    from ...io.files.sentences import count
     from ...io.images.exr import write_exr
     from ...io.images.half import half_scale
     from ...io.measurement.ghost_model_file import read_ghost_model, read_replay_camera
     from ...measure.replay.model_image import replay_model as draw
     from ...measure.replay.placement import brightness_gain
     from ...model.measurement.replay_camera import ReplayCamera
+    from ...sentences import count
 
     known = read_ghost_model(model)
     shot = ReplayCamera() if camera is None else read_replay_camera(camera)

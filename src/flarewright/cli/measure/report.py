@@ -30,9 +30,9 @@ def report(
 
     run = read_run(folder)
     check_place(place, (".html", ".htm"))
-    from ...io.files.sentences import count
     from ...io.measurement.ghost_model_file import read_ghost_model, read_ghost_tracks
     from ...measure.report.page import strange, write_report
+    from ...sentences import count
     from ...workflow.measure_provenance import COMPACT, MODEL, TRACKS
 
     known = None

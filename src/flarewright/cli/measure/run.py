@@ -231,7 +231,7 @@ def merge_summary(run: MergedRun) -> dict[str, Any]:
 
 def words(run: MergedRun, folder: Path) -> str:
     """Return the result of merging in words."""
-    from ...io.files.sentences import count
+    from ...sentences import count
 
     seen = sum(frame.light_found for frame in run.frames)
     (x, y), (dx, dy) = run.axis_px, run.axis_error_px

@@ -133,7 +133,7 @@ def run_and_print(
     FlarewrightError
         As `measure_run.run_stages`.
     """
-    from ...io.files.sentences import count
+    from ...sentences import count
     from ...workflow.measure_run import run_stages
 
     def report(line: str) -> None:

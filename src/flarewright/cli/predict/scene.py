@@ -69,7 +69,7 @@ def predict_and_print(path: Path, options: PredictOptions, unnamed: str) -> None
 
 def _nearby(scene: Scene, options: PredictOptions) -> NearbySearch | None:
     """Return the search for a position that `--near` asks for."""
-    from ...io.files.sentences import did_you_mean
+    from ...sentences import did_you_mean
     from ...workflow.scene_prediction import NearbySearch
 
     if options.near is None:

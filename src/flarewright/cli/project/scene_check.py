@@ -14,9 +14,9 @@ from ..shared_options import Json
 
 def check(file: Annotated[Path, typer.Argument(metavar="FILE", help="A scene file.")], as_json: Json = False) -> None:
     """Check a scene, and list all errors; exit code 2 if it cannot be used."""
-    from ...io.files.sentences import count, summary
     from ...io.project.scene_file import read_scene
     from ...predict.tracks import camera_track, moments, sightings
+    from ...sentences import count, summary
     from ...workflow.scene_check import camera_errors, light_errors
 
     with errors_as_json(file, as_json), naming(file):

@@ -94,7 +94,7 @@ def film_data(film: FilmResult) -> dict[str, Any]:
 
 def film_words(film: FilmResult) -> str:
     """Return a sentence about a film."""
-    from ...io.files.sentences import count
+    from ...sentences import count
 
     width, height = film.size_px
     return (

@@ -89,7 +89,7 @@ def _data(result: ShotResult, project: Project, seconds: float) -> dict[str, Any
 
 
 def _print(result: ShotResult, seconds: float) -> None:
-    from ...io.files.sentences import count
+    from ...sentences import count
 
     drawn = sum(frame.drawn for frame in result.frames)
     kept = len(result.frames) - drawn

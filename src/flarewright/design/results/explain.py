@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...io.files.sentences import count
+from ...sentences import count
 from ...typing import Floats
 from ..finishing.candidate import Outcome
 from ..problem.problem import Problem

@@ -9,7 +9,6 @@ from math import atan, degrees, isfinite, radians, tan
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from ...errors import FlarewrightError, GlassError, LensError
 from ...io.lens.coating_text import UNCOATED, coating_from, format_coating
@@ -22,6 +21,7 @@ from ...optics.lens.surface_shape import sag
 from ...optics.rays.image_height import image_heights
 from ...render.scene.photographic_defaults import as_photographed, plausible_preset
 from ...render.scene.resolve import open_lens
+from ...sentences import INVALID
 from ...typing import Floats
 from ..common.messages import sentence, spoken
 
@@ -71,7 +71,7 @@ def set_cell(project: Project, row: int, column: str, text: str) -> Project:
     else:
         try:
             new = _changed(old, row, column, words)
-        except ValidationError as error:
+        except INVALID as error:
             raise LensError(f"row {row}: {sentence(error)}") from None
     rows = (*lens.rows[:row], new, *lens.rows[row + 1 :])
     if column == "coating" and not isinstance(project.coating, AsLens):

@@ -6,10 +6,9 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from pydantic import ValidationError
-
 from ...errors import FlarewrightError, ProjectError
 from ...model import Project
+from ...sentences import INVALID
 from ..common.messages import sentence
 from . import design_targets, ghosts, lens, light_path, plate, shot
 
@@ -84,7 +83,7 @@ def done(project: Project, name: str, values: dict[str, Any]) -> tuple[Project, 
     label, command = COMMANDS[name]
     try:
         return command(project, **values), label
-    except ValidationError as error:
+    except INVALID as error:
         raise ProjectError(sentence(error)) from None
     except (TypeError, KeyError, IndexError, ValueError) as error:
         if isinstance(error, FlarewrightError):

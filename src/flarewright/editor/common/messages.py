@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import re
 
-from pydantic import ValidationError
-
-from ...io.files.sentences import validation_sentences
+from ...sentences import INVALID, validation_sentences
 
 # names of fields on the page; other fields are named by their own words, without units
 SPOKEN = {
@@ -26,7 +24,7 @@ _REPORTED = re.compile(r"([\w.\[\]]+)( should be |: )(.*)", re.DOTALL)
 
 def sentence(error: Exception) -> str:
     """Return one sentence for an error that rejected an edit."""
-    if isinstance(error, ValidationError):
+    if isinstance(error, INVALID):
         return "; ".join(_said(reported) for reported in validation_sentences(error))
     return " ".join(str(error).split())
 

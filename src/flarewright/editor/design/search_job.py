@@ -24,11 +24,11 @@ from ...design.solvers.evolution_log import until
 from ...design.solvers.polish import compile_kernels
 from ...design.solvers.pool_search import PoolState, solve
 from ...errors import FlarewrightError, OutputError, ProjectError
-from ...io.files.sentences import count
 from ...model import AsLens, CoatingChoice, Design, Everywhere, InTurn, Lens, PerRow, Project, Surface
 from ...optics.lens.paraxial import first_order
 from ...optics.rays.pack import resolve_coatings
 from ...render.scene.resolve import open_lens, resolve_project
+from ...sentences import count
 from ...typing import Floats, Mask
 from ..commands.design_targets import clear_ghost_targets, ghost_target_names
 from ..common.latest_job import Check, Lane, refused_at_exit

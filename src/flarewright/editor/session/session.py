@@ -9,11 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from ...errors import FlarewrightError, ProjectError
 from ...io.files.door import expanded
 from ...model import Backplate, Project
+from ...sentences import INVALID
 from ..commands.lens import table_of
 from ..commands.registry import done
 from ..common.messages import sentence
@@ -143,7 +142,7 @@ class Session:
         with self.lock:
             try:
                 view = self.view.replace(**values)
-            except ValidationError as error:
+            except INVALID as error:
                 raise ProjectError(sentence(error)) from None
             self.view = view
             self._changed()

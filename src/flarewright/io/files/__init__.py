@@ -1,13 +1,12 @@
-"""Text and state files: reading, atomic writing, and error sentences shared by all readers.
+"""Text and state files: reading and atomic writing.
 
 Readers call `text_file.read_toml` or `text_file.read_text` and turn validation errors into sentences with
-`sentences.validation_sentences`. Writers call `atomic_write.write_atomically`.
+`flarewright.sentences`. Writers call `atomic_write.write_atomically`.
 
 - `atomic_write`: `write_atomically`, complete files or none; `delete_written`, `make_folder`
 - `door`: `outside`, the one way to a file of the user; `sentences_for`, `refuse_claim`, `expanded`, `shown`
 - `file_lock`: `held`, `locked`, locks between processes
 - `file_kind`: `refuse_other_kind`, errors for a file of another kind than the wanted one
-- `sentences`: `validation_sentences`, `did_you_mean`, `summary` and other helpers for error messages
 - `silence_libraries`: `silenced`, suppresses the output of libraries
 - `state_folder`: `state_folder`, the folder for data that outlives a run
 - `tar_members`: `tar_member`, `join_parts`, tar files joined from parts

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from .sentences import Keys, did_you_mean, key_place, shorten, validation_sentences
+from ...sentences import Keys, did_you_mean, key_place, shorten, validation_sentences
 
 Record = TypeVar("Record")
 

@@ -24,7 +24,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from flarewright.errors import ProjectError, raised_as
 from flarewright.model import (
@@ -44,7 +44,7 @@ from flarewright.model import (
 from flarewright.model.lens.coating import STANDARD_NAMES
 from flarewright.model.project.project import CHOICES, everywhere
 
-from ..files.sentences import did_you_mean, shorten, validation_sentences
+from ...sentences import INVALID, did_you_mean, shorten, validation_sentences
 from ..files.text_file import read_toml
 from ..files.type_slips import record_of
 
@@ -103,7 +103,7 @@ def _parsed(text: str, forms: str) -> Coating:
             return _film(rest)
         if kind == "stack":
             return Stack(layers=tuple(_film(part) for part in rest.split(",")))
-    except ValidationError as error:
+    except INVALID as error:
         raise ProjectError(f"coating {text!r}: {'; '.join(validation_sentences(error))}") from None
     except ValueError:
         pass

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from flarewright.model.lens.raw_lens import Configuration
 
-from ..files.sentences import shorten
+from ...sentences import shorten
 from .foreign_file import INFINITE, number_of
 
 Place = tuple[str, int]

@@ -9,14 +9,12 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from flarewright.errors import FileError, LensError
 from flarewright.model import Surface
 from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
 
+from ...sentences import INVALID, summary, validation_sentences
 from ..files.door import sentences_for
-from ..files.sentences import summary, validation_sentences
 from ..files.text_file import read_bytes
 
 MOST_SURFACES = 500
@@ -61,7 +59,7 @@ def sequence_row(
         return None
     try:
         return SequenceRow(number=number, surface=Surface(**surface), stop=stop, automatic_rim=automatic_rim)
-    except ValidationError as error:
+    except INVALID as error:
         problems += [f"{where}: {sentence}" for sentence in validation_sentences(error)]
         return None
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..files.sentences import shorten
+from ...sentences import shorten
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from ...errors import ProjectError
 from ...model import Imperfection, Plate, SensorGrating
-from ..files.sentences import validation_sentences
+from ...sentences import validation_sentences
 
 _Model = TypeVar("_Model", Imperfection, SensorGrating)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...model.lens.scatter import RowScatter, Scatter
-from ..files.sentences import did_you_mean, shorten
+from ...sentences import did_you_mean, shorten
 from ..files.type_slips import record_of
 
 

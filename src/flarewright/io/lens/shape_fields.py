@@ -6,13 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from flarewright.model import Element, Figure, Position, Surface
 from flarewright.model.lens.figure import LARGEST_NM, MOST_NOLL
 from flarewright.model.lens.prescription import MOST_TERMS
 
-from ..files.sentences import did_you_mean, shorten, validation_sentences
+from ...sentences import INVALID, did_you_mean, shorten, validation_sentences
 from .lens_fields import CURVATURE, NumberField
 
 ELEMENT_KEYS = ("rows", "decentre", "tilt_deg")
@@ -182,7 +180,7 @@ def _figure(value: object, where: str, folder: Path | None, problems: list[str])
         return None
     try:
         return Figure(**fields)
-    except ValidationError as error:
+    except INVALID as error:
         problems += [f"{where}: {sentence}" for sentence in validation_sentences(error)]
         return None
 

@@ -20,16 +20,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from flarewright.errors import FileError, GlassError, LensError, ProjectError
 from flarewright.model import Coating, Iris, Lens, Row, Stop, Surface
 from flarewright.model.lens.prescription import NO_GLASS
 from flarewright.model.lens.raw_lens import LensReading, RawLens, RawSequence
 
+from ...sentences import INVALID, count, shorten, summary, validation_sentences
 from ..files.door import shown
 from ..files.file_kind import OPTILAND_KEY, foreign_hint, lens_key, refuse_other_kind
-from ..files.sentences import count, shorten, summary, validation_sentences
 from ..files.text_file import read_bytes, read_toml
 from . import media
 from .coating_text import coating_from
@@ -147,7 +145,7 @@ def lens_from_table(table: dict[str, Any], where: str, *, folder: Path | None = 
             lens = Lens(
                 **fields, rows=whole, elements=elements, positions=positions, scatter=scatter, coating_presets=presets
             )
-        except ValidationError as error:
+        except INVALID as error:
             problems += validation_sentences(error)
     if lens is None:
         raise LensError(summary(where, problems), tuple(problems))
@@ -183,7 +181,7 @@ def _top_level(table: dict[str, Any], folder: Path | None, problems: list[str]) 
         unknown_keys(iris, tuple(Iris.model_fields), "iris: ", problems)
         try:
             fields["iris"] = _iris(iris, folder)
-        except ValidationError as error:
+        except INVALID as error:
             problems += [f"iris: {sentence}" for sentence in validation_sentences(error)]
     return fields
 

@@ -27,8 +27,8 @@ from pydantic import ValidationError
 
 from ...errors import FlarewrightError
 from ...model.measurement.capture import CameraNoise, Capture
+from ...sentences import did_you_mean, summary, validation_sentences
 from ..files.door import expanded, sentences_for
-from ..files.sentences import did_you_mean, summary, validation_sentences
 from ..files.text_file import read_json, read_text
 from ..files.type_slips import record_of
 from ..images.photo import PHOTO_SUFFIXES, photo_facts

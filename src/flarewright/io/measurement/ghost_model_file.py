@@ -13,9 +13,9 @@ from ...model.measurement.corrections import Corrections
 from ...model.measurement.ghost_model import GhostModel
 from ...model.measurement.ghost_tracks import Tracks
 from ...model.measurement.replay_camera import ReplayCamera
+from ...sentences import summary
 from ..files.atomic_write import write_text_atomically
 from ..files.file_kind import lens_key
-from ..files.sentences import summary
 from ..files.text_file import LARGEST, check_version, read_json
 from ..files.type_slips import record_of
 

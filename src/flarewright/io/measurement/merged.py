@@ -13,8 +13,8 @@ import numpy as np
 from ...errors import FileError, FlarewrightError, OutputError
 from ...model.layer import Layer
 from ...model.measurement.capture import FrameInfo, MergedFrame, MergedRun
+from ...sentences import summary
 from ..files.atomic_write import write_text_atomically
-from ..files.sentences import summary
 from ..files.text_file import read_json
 from ..files.type_slips import record_of
 from ..images.exr import read_exr, write_exr

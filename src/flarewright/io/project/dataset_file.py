@@ -12,7 +12,7 @@ from ...errors import FlarewrightError, ProjectError
 from ...model.project import dataset as records
 from ...model.project import distribution as distributions
 from ...model.project.dataset import DatasetSpec
-from ..files.sentences import summary
+from ...sentences import summary
 from ..files.type_slips import record_of
 from ..lens.coating_text import parse_coating_choice
 from .file_of_kind import read_file_of_kind

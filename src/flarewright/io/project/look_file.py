@@ -9,14 +9,12 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from ...errors import ProjectError, raised_as
 from ...model import Iris, Look
 from ...model.project.look import CAMERA_KEYS, LIGHT_KEYS, LOOK_SECTIONS
+from ...sentences import INVALID, did_you_mean, summary, validation_sentences
 from ..files.door import expanded
 from ..files.file_kind import refuse_other_kind
-from ..files.sentences import did_you_mean, summary, validation_sentences
 from ..files.text_file import check_version, read_toml
 from .project_file import project_from_data
 from .project_text import project_data, toml_text
@@ -98,7 +96,7 @@ def read_look(name_or_path: str | os.PathLike[str]) -> Look:
     try:
         name, notes = data.get("name", path.stem), data.get("notes", "")
         return Look(name=name, notes=notes, example=example, says=_look_keys(data))
-    except ValidationError as error:
+    except INVALID as error:
         found = tuple(validation_sentences(error))
         raise ProjectError(summary(str(path), list(found)), found) from None
 

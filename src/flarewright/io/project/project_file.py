@@ -21,7 +21,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from ...errors import FlarewrightError, LensError, ProjectError
+from ...errors import FlarewrightError, LensError, ProjectError, RecordError
 from ...model.lens import coating as coatings
 from ...model.lens import scatter as scatters
 from ...model.lens.imperfection import Imperfection
@@ -38,7 +38,7 @@ from ...model.project.backplate import Backplate, PlateSearch
 from ...model.project.camera import Camera
 from ...model.project.holdout import Holdout
 from ...model.project.project import Output, Project, Quality
-from ..files.sentences import Keys, did_you_mean, shorten, summary, validation_sentences
+from ...sentences import Keys, did_you_mean, shorten, summary, validation_sentences
 from ..files.type_slips import record_of
 from ..lens.coating_text import coating_from, parse_coating, parse_coating_choice
 from ..lens.plate_text import parse_plate
@@ -209,12 +209,12 @@ def expand_light(light: Any, where: str, folder: Path, problems: list[str]) -> A
 # Findings
 
 
-def validation_messages(error: ValidationError, data: Any, sections: Sections | None = None) -> list[str]:
+def validation_messages(error: ValidationError | RecordError, data: Any, sections: Sections | None = None) -> list[str]:
     """Return one sentence per error of a failed validation.
 
     Parameters
     ----------
-    error : pydantic.ValidationError
+    error : ValidationError or RecordError
     data : object
         The validated data; names places as the file does.
     sections : dict of str to tuple of type, optional

@@ -15,7 +15,7 @@ from ...model.project import light as spectra
 from ...model.project import project as choices
 from ...model.project import scene as records
 from ...model.project.scene import Scene
-from ..files.sentences import shorten, summary
+from ...sentences import shorten, summary
 from ..files.text_file import check_version
 from ..files.type_slips import record_of
 from .file_of_kind import NEWEST, read_file_of_kind

@@ -16,10 +16,9 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from ...errors import ProjectError, raised_as
 from ...model.project.light import D65, BlackBody, EqualEnergy, Lines, Rgb, Spectrum, Tabulated
+from ...sentences import INVALID
 from ..files.text_file import read_text
 
 _KNOWN = "d65, equal-energy, black-body:KELVIN, lines:NM,NM*POWER,..., rgb:R,G,B or a .csv file"
@@ -55,7 +54,7 @@ def parse_spectrum(text: str, *, folder: Path | None = None) -> Spectrum:
             return Lines(lines=tuple(_line(part, text) for part in rest.split(",")))
         if word == "rgb":
             return Rgb.model_validate({"rgb": [_number(part, text) for part in rest.split(",")]})
-    except ValidationError as error:
+    except INVALID as error:
         reason = {
             "black-body": "a black body has between 500 and 100000 K",
             "lines": "spectral lines lie between 360 and 830 nm and have powers of 0 or more",
@@ -104,7 +103,7 @@ def _read_table(path: Path) -> Tabulated:
             ) from None
     try:
         return Tabulated(wavelength_nm=tuple(nm for nm, _ in pairs), power=tuple(power for _, power in pairs))
-    except ValidationError as error:
+    except INVALID as error:
         raise ProjectError(
             f"the spectrum file {path} needs at least two lines with rising wavelengths in nm and powers of 0 or more"
         ) from error

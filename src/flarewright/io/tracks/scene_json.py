@@ -11,9 +11,9 @@ from pydantic import Field, ValidationError
 
 from ...errors import FileError
 from ...model.base import Frozen
+from ...sentences import summary, validation_sentences
 from ...typing import Floats
 from ..files.door import shown
-from ..files.sentences import summary, validation_sentences
 from .numbers import MOST_FRAMES, MOST_TRACKS
 from .scene import CameraFrame, LightFrame, SceneLight, tracks_of_scene
 from .track import TrackFile

@@ -10,10 +10,10 @@ from typing import Annotated
 from pydantic import Field, field_validator
 
 from ...errors import ProjectError, raised_as
-from ...io.files.sentences import summary
 from ...io.files.text_file import read_toml
 from ...io.files.type_slips import record_of
 from ...model.base import Frozen
+from ...sentences import summary
 
 # SLURM's own forms: 90, 1:30:00, 2-12:00:00
 _WALLTIME = re.compile(r"(\d{1,4}-)?\d{1,4}(:\d{1,2}){0,2}", re.ASCII)

@@ -11,10 +11,10 @@ from math import ceil, floor, isfinite, log10
 
 import numpy as np
 
-from ...io.files.sentences import count
 from ...kernels.ghost_model.pupil_mesh import DISC_NUMBERS, FIRST_DISC, FIRST_G
 from ...model.measurement.ghost_model import AberrationGhost, Channel, Curve, Curves, GhostModel
 from ...model.measurement.ghost_tracks import GhostTrack, Tracks
+from ...sentences import count
 from ...typing import Floats, Indices, Pixels, Progress
 from ..core.checkpoint import Journal
 from ..core.parallel import done_by

@@ -10,9 +10,9 @@ from math import log
 
 import numpy as np
 
-from ...io.files.sentences import count
 from ...kernels.ghost_model.pupil_mesh import BELOW, FIRST_G, FIRST_I
 from ...model.measurement.ghost_model import Blades
+from ...sentences import count
 from ...typing import Mask, Pixels, Progress, Report
 from ..core.checkpoint import Journal
 from ..core.neighbourhood import brightest

@@ -10,9 +10,9 @@ from functools import partial
 
 import numpy as np
 
-from ...io.files.sentences import count
 from ...kernels.ghost_model.pupil_mesh import FIRST_DISC, FIRST_I
 from ...model.measurement.ghost_model import AberrationGhost, Blades
+from ...sentences import count
 from ...typing import Floats, Pixels, Progress, Report
 from ..core.checkpoint import Journal
 from ..core.parallel import run_concurrently

@@ -22,11 +22,11 @@ import numpy as np
 
 from ...errors import FileError, FlarewrightError, OutputError
 from ...io.files.atomic_write import write_text_atomically
-from ...io.files.sentences import count
 from ...io.files.text_file import digest_of, read_json
 from ...io.images.photo import open_photo
 from ...io.measurement.merged import read_frame, read_run, write_frame, write_run
 from ...model.measurement.capture import OF_LIGHT, CameraNoise, Capture, FrameInfo, Matrix3, MergedFrame, MergedRun
+from ...sentences import count
 from ...typing import Progress, Report
 from ..core.sampling import evenly_spaced
 from ..merging.calibrate import CameraCalibration, calibrate

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from ...io.files.sentences import count
 from ...io.images.html_page import html_page
 from ...model.layer import Layer
 from ...model.measurement.capture import FrameInfo, MergedFrame, MergedRun
 from ...model.measurement.ghost_model import GhostModel
 from ...render.image.display import auto_exposure, view
 from ...render.plots.svg import Chart, EmbeddedImage, Mark, Text
+from ...sentences import count
 from ...typing import Floats, Indices, Mask
 from ..core.binning import binned
 from ..glow.subtraction import AROUND_LIGHT

@@ -10,7 +10,6 @@ import numpy as np
 
 from ...errors import FlarewrightError
 from ...io.files.atomic_write import write_text_atomically
-from ...io.files.sentences import count
 from ...io.files.text_file import read_json
 from ...io.images.html_page import html_page
 from ...model.measurement.capture import MergedRun
@@ -18,6 +17,7 @@ from ...model.measurement.ghost_model import GhostModel
 from ...model.measurement.ghost_tracks import Tracks
 from ...render.plots.chart import COLOURS, Series, chart, number, with_deviation
 from ...render.plots.svg import Chart
+from ...sentences import count
 from ...typing import Floats
 from ..core.sampling import evenly_spaced
 from .curves import curves_section

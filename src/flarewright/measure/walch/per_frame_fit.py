@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ...io.files.sentences import count
 from ...kernels.ghost_model.bezier import BORDER, INNER, NUMBERS
 from ...model.measurement.capture import MergedRun
 from ...model.measurement.ghost_model import BezierGhost, GhostModel
+from ...sentences import count
 from ...typing import Floats, Progress, Report
 from ..core.checkpoint import Journal
 from ..core.frame_reading import read_views

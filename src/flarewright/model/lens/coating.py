@@ -6,7 +6,6 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field
 
-from ...errors import ProjectError
 from ..base import Frozen
 
 Index = Annotated[float, Field(ge=1.0, le=4.0)]
@@ -64,9 +63,10 @@ class Standard(Frozen):
 
     def __init__(self, word: StandardName | None = None, /, **fields: Any) -> None:
         """Accept the name as a positional argument or as a keyword."""
-        if word is not None and word not in STANDARD_NAMES:
-            raise ProjectError(f"{word!r} is no standard coating; use one of {', '.join(STANDARD_NAMES)}")
         super().__init__(**({} if word is None else {"name": word}), **fields)
+
+    # as of `Frozen`: inside another record the fields have names
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
 
 Coating = Annotated[Bare | QuarterWave | Film | Stack | Standard, Field(discriminator="kind")]

@@ -10,12 +10,11 @@ from collections.abc import Iterator
 from math import atan, degrees
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from ...errors import LensError
 from ...model import Lens, Row, Stop, Surface
 from ...model.lens.prescription import LARGEST_F_NUMBER, LEAST_F_NUMBER, NO_GLASS
 from ...model.lens.raw_lens import LensReading, RawSequence, SequenceRow
+from ...sentences import INVALID, validation_sentences
 from ..lens.paraxial import FirstOrder, first_order
 from .configurations import Setting, positions_of
 
@@ -90,8 +89,8 @@ def _settings(raw: RawSequence, remarks: list[str]) -> Iterator[Setting]:
         except LensError as error:
             why = str(error).removeprefix(f"{raw.file}: ")
             remarks.append(f"configuration {one.number} is left out: {why}")
-        except ValidationError as error:
-            remarks.append(f"configuration {one.number} is left out: {error.errors()[0]['msg'].lower()}")
+        except INVALID as error:
+            remarks.append(f"configuration {one.number} is left out: {validation_sentences(error)[0]}")
 
 
 def _without_idle(raw: RawSequence, remarks: list[str]) -> tuple[list[SequenceRow], float]:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypedDict, TypeVar, Unpack
 from pydantic import ValidationError
 
 from ...errors import ProjectError
-from ...model import Lens, Project
+from ...model import Lens, Project, Quality
+from ...sentences import record_sentences, summary
 
 if TYPE_CHECKING:
     from ...model import (  # fmt: skip
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
         Output,
         Plate,
         ProjectCurve,
-        Quality,
         Scatter,
         Starburst,
         Timeline,
@@ -47,14 +47,14 @@ R = TypeVar("R")
 
 
 class Settings(TypedDict, total=False):
-    """The fields of a project except its lens; `coating` can also be a text of the command line."""
+    """The fields of a project except its lens; `coating` and `quality` can also be texts of the command line."""
 
     f_number: float | None
     iris: Iris | None
     coating: str | PathLike[str] | Coating | CoatingChoice | None
     lights: Sequence[Light]
     camera: Camera
-    quality: Quality
+    quality: Quality | str
     output: Output
     dirt: Dirt
     starburst: Starburst
@@ -98,13 +98,13 @@ def project_of(given: Project | Lens | str | PathLike[str], **settings: Unpack[S
         from ...io.lens.coating_text import coating_choice
 
         fields["coating"] = coating_choice(settings["coating"])
+    if isinstance(word := fields.get("quality"), str):
+        # as --quality does, it keeps the other settings
+        fields["quality"] = (given.quality if isinstance(given, Project) else Quality()).replace(mode=word)
     try:
         return Project.model_validate(fields)
     except ValidationError as error:
-        from ...io.files.sentences import summary
-        from ...io.project.project_file import validation_messages
-
-        findings = validation_messages(error, fields)
+        findings = record_sentences(error, Project, fields)
         raise ProjectError(summary("the project", findings), tuple(findings)) from None
 
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 from os import PathLike
 from typing import Any
 
-from pydantic import ValidationError
-
 from ...errors import ProjectError
-from ...io.files.sentences import validation_sentences
 from ...io.measurement.ghost_model_file import is_ghost_model_file
 from ...io.project.look_file import read_look
 from ...model import Art, Bare, Camera, Everywhere, InTurn, Iris, Light, Look, Preset, Project
 from ...model.project.look import CAMERA_KEYS, LIGHT_KEYS
 from ...model.project.project import AsLens, CoatingChoice
 from ...optics.rays.pack import preset_names, resolve_coatings, rows_in_air
+from ...sentences import INVALID, validation_sentences
 from .photographic_defaults import as_photographed
 from .resolve import open_lens
 
@@ -118,7 +116,7 @@ def look_of(project: Project, name: str, notes: str = "") -> tuple[Look, tuple[s
         remarks.append("lights differ in colour or size: the look uses those of the first")
     try:
         return Look(name=name, notes=notes, example=project, says=tuple(says)), tuple(remarks)
-    except ValidationError as error:
+    except INVALID as error:
         raise ProjectError(f"of the look, {validation_sentences(error)[0]}") from None
 
 

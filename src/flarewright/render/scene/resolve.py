@@ -7,10 +7,7 @@ from functools import cached_property, lru_cache
 from math import hypot
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from ...errors import GlassError, LensError, ProjectError, naming
-from ...io.files.sentences import summary, validation_sentences
 from ...io.images.height_image import read_heights
 from ...io.lens.formats.codev import FirstColumn
 from ...io.lens.library import in_library, lens_path
@@ -28,6 +25,7 @@ from ...optics.lens_import.patent_repair import RIM_CUT, Apertures, axial_openin
 from ...optics.lens_import.semi_diameters import with_semi_diameters
 from ...optics.lens_import.sequential_import import lens_of_sequence
 from ...optics.rays.pack import SensorMirror, resolve_coatings
+from ...sentences import INVALID, summary, validation_sentences
 
 
 @dataclass(frozen=True)
@@ -140,7 +138,7 @@ def _read(
             # raises for a zoom position that forms no image
             _ = opened.remarks
             return opened
-    except ValidationError as error:
+    except INVALID as error:
         # values whose combination no earlier check rejects
         problems = validation_sentences(error)
         raise LensError(summary(str(path), problems), tuple(problems)) from None

@@ -7,10 +7,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from ...errors import FlarewrightError, ProjectError
-from ...io.files.sentences import count, validation_sentences
 from ...io.images.plate_picture import PlatePicture
 from ...jobs.frame_list import FramePattern
 from ...model import Backplate, Light, LightCurve, LightKey, Project
@@ -22,6 +20,7 @@ from ...plates.marked import light_rows
 from ...plates.settings import PlateSettings, parse_source
 from ...plates.tracking import follow
 from ...render.scene.pixel_place import field_angles_at, image_px
+from ...sentences import INVALID, count, validation_sentences
 from ...typing import Progress
 from .plate_files import plate_picture
 from .plate_frame import bare_text, check_plate, images_of, plate_images, plate_optics, same_optics
@@ -141,7 +140,7 @@ def with_found_lights(project: Project, found: FoundLights) -> tuple[Project, tu
     directions, factor = plate_optics(framed)
     try:
         lights, lost = lights_at(found.shot.lights, _FRAME, directions, factor, framed.camera.size_px)
-    except ValidationError as error:
+    except INVALID as error:
         raise ProjectError("; ".join(validation_sentences(error))) from None
     if not any(light.intensity > 0.0 for light in lights):
         raise ProjectError("the lens images none of the found lights; choose a longer lens, or a smaller sensor")

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import FlarewrightError
-from ...io.files.sentences import count
 from ...io.images.contact_sheet import Figure, sheet_picture
 from ...model.project.dataset import DatasetSpec
+from ...sentences import count
 from .background import list_backgrounds
 from .draw import check_lenses
 from .pictures import Pictures, draw_pictures

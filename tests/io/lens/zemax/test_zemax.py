@@ -368,7 +368,7 @@ def test_near_configurations_are_focus_positions(tmp_path):
         (cells("THIC", 5, 20, 30, 40), 0, "repeats the gaps of configuration 1"),
         (cells("THIC", 0, 1e10, 900, 500) + cells("THIC", 5, 30, 31, 33), 0, "as --focus does: no positions"),
         (cells("THIC", 0, 1e10, 1e10, 500) + cells("THIC", 2, 20, 30, 31), 2, "to which focal length each near"),
-        (cells("THIC", 2, 20, 30, 20000), 2, "configuration 3 is left out: input should be less"),
+        (cells("THIC", 2, 20, 30, 20000), 2, "configuration 3 is left out: thickness should be less"),
     ],
 )  # fmt: skip
 def test_what_a_position_cannot_hold_is_reported(tmp_path, table, kept, said):

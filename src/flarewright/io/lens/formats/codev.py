@@ -19,8 +19,8 @@ from typing import Literal
 from flarewright.model import Medium
 from flarewright.model.lens.raw_lens import Configuration, RawSequence, SequenceRow
 
+from ....sentences import shorten
 from ...files.door import shown
-from ...files.sentences import shorten
 from .. import media
 from ..configuration_table import Stated
 from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_data, number_of, sequence_row, whole

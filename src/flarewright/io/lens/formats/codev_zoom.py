@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 from flarewright.model.lens.raw_lens import Configuration
 
-from ...files.sentences import shorten
+from ....sentences import shorten
 from ..configuration_table import MOST, NOWHERE, Commands, Place, Stated, settings
 from ..foreign_file import number_of
 from .codev_words import IDLE, VIGNETTING

@@ -16,7 +16,7 @@ from flarewright.errors import LensError
 from flarewright.model import Medium
 from flarewright.model.lens.raw_lens import RawLens, RawRow
 
-from ...files.sentences import did_you_mean, shorten, summary
+from ....sentences import did_you_mean, shorten, summary
 from ...files.text_file import read_text
 from .. import media
 from ..foreign_file import MOST_SURFACES, lens_errors

@@ -20,8 +20,8 @@ from flarewright.model import Lens, Medium, Stop, Surface
 from flarewright.model.lens.prescription import MOST_TERMS
 from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
 
+from ....sentences import shorten
 from ...files.door import sentences_for, shown
-from ...files.sentences import shorten
 from ...files.text_file import read_json
 from .. import media
 from ..foreign_file import INFINITE, MOST_SURFACES, json_number, largest_field, lens_errors, sequence_row, whole

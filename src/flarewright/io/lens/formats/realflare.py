@@ -15,7 +15,7 @@ from typing import Any
 from flarewright.errors import LensError
 from flarewright.model.lens.raw_lens import RawSequence
 
-from ...files.sentences import shorten
+from ....sentences import shorten
 from ...files.text_file import read_json
 from ..foreign_file import json_number, lens_errors
 from .table_rows import TableHead, TableRow, sequence_of

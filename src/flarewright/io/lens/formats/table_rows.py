@@ -11,8 +11,8 @@ from flarewright.errors import LensError
 from flarewright.model.lens.prescription import LARGEST_F_NUMBER, LEAST_F_NUMBER
 from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
 
+from ....sentences import summary
 from ...files.door import shown
-from ...files.sentences import summary
 from .. import media
 from ..foreign_file import MOST_SURFACES, sequence_row
 from ..medium_names import numbered_medium

@@ -21,8 +21,8 @@ from pathlib import Path
 from flarewright.model.lens.prescription import MOST_TERMS
 from flarewright.model.lens.raw_lens import RawSequence
 
+from ....sentences import did_you_mean, shorten
 from ...files.door import sentences_for
-from ...files.sentences import did_you_mean, shorten
 from ...files.text_file import read_bytes
 from ..foreign_file import decoded, lens_errors, number_of
 from .table_rows import TableHead, TableRow, sequence_of

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from flarewright.errors import ProjectError
 
-from ...files.sentences import shorten
+from ....sentences import shorten
 from .record import LensRecord
 
 Range = tuple[float, float]

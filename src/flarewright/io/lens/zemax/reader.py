@@ -23,8 +23,8 @@ from flarewright.model import Medium
 from flarewright.model.lens.prescription import MOST_TERMS
 from flarewright.model.lens.raw_lens import Configuration, RawSequence, SequenceRow
 
+from ....sentences import did_you_mean, shorten
 from ...files.door import shown
-from ...files.sentences import did_you_mean, shorten
 from .. import media
 from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_data, number_of, sequence_row, whole
 from ..glass_catalogue import CatalogueGlass, by_name, same_name

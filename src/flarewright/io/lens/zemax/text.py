@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from ...files.sentences import count, shorten
+from ....sentences import count, shorten
 from ..foreign_file import number_of
 from ..glass_catalogue import MAKERS
 from .keywords import TEXTS, USED_OF_SURFACE

@@ -5,14 +5,19 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterable
 from datetime import date, time
-from typing import Any, cast
+from typing import Any, cast, get_args
 
 from pydantic import BaseModel, ValidationError
+
+from .errors import RecordError
 
 Keys = list[int | str]
 """Path of a value in a file: ["lights", 0, "field_deg"]."""
 Finding = dict[str, Any]
 """One error of pydantic: type, loc, msg, input and ctx."""
+
+INVALID = (ValidationError, RecordError)
+"""What an invalid record raises: `model_validate` the first, its class and `replace` the second."""
 
 _NUMBER, _INTEGER, _TEXT, _LIST, _TABLE = "a number", "a whole number", "a text in quotes", "a list", "a table"
 _TIME = "a date with a time and its zone, like 2024-06-21T18:00:00+02:00"
@@ -43,6 +48,10 @@ _LONGEST_KEY = 100
 # exact lengths of places, sizes and colours; longer limits are upper bounds
 _FIXED_LENGTHS = (2, 3)
 
+# findings of a value where a file has a table, or several
+_TABLES = ("model_type", "model_attributes_type", "union_tag_not_found", "tuple_type")
+_NOT_KNOWN = "is not a known"
+
 # lists whose entries have separate headings in TOML
 _HEADINGS = {
     "lights": "[[lights]]", "cameras": "[[cameras]]", "rules": "[[art.rules]]",
@@ -51,13 +60,14 @@ _HEADINGS = {
 
 
 def validation_sentences(
-    error: ValidationError, data: Any = None, unknown: Callable[[Keys], str] = lambda _: ""
+    error: ValidationError | RecordError, data: Any = None, unknown: Callable[[Keys], str] = lambda _: ""
 ) -> list[str]:
-    """Turn a pydantic ValidationError into sentences for the user; the only place that reads pydantic's messages.
+    """Turn the errors of an invalid record into sentences for the user; this module alone reads pydantic's messages.
 
     Parameters
     ----------
-    error : ValidationError
+    error : ValidationError or RecordError
+        A RecordError has its sentences already.
     data : object, optional
         The validated data; names places as the file does. None: names of the record's fields.
     unknown : callable, optional
@@ -68,30 +78,95 @@ def validation_sentences(
     list of str
         One entry per place and error: "iris.blades should be a whole number, not 'six'".
     """
+    if isinstance(error, RecordError):
+        return list(error.problems)
+    return _sentences(error, data, unknown)
+
+
+def record_sentences(error: ValidationError, record: type[BaseModel], fields: dict[str, Any]) -> list[str]:
+    """Return the sentences on a record that a Python program makes, in words of Python.
+
+    Parameters
+    ----------
+    error : ValidationError
+    record : type of BaseModel
+    fields : dict of str to object
+        Its arguments.
+
+    Returns
+    -------
+    list of str
+        Unknown names first, as a misspelt field is also a missing one.
+    """
+    known = tuple(record.model_fields)
+
+    def suggestion(keys: Keys) -> str:
+        return (did_you_mean(str(keys[0]), known) or f"; known are {', '.join(known)}") if len(keys) == 1 else ""
+
+    return sorted(_sentences(error, fields, suggestion, record), key=lambda each: _NOT_KNOWN not in each)
+
+
+def _sentences(
+    error: ValidationError, data: Any, unknown: Callable[[Keys], str], record: type[BaseModel] | None = None
+) -> list[str]:
+    """Return the sentences on an error; in words of Python if its record is given."""
     # expected values by place: in a union each member reports a separate error
     found: dict[tuple[str, str], list[str]] = {}
     for finding in cast(list[Finding], error.errors(include_url=False)):
+        if record and (alone := _record_alone(finding, data)):
+            found.setdefault((f"{alone} should be a list: write {alone}=[...]", ""), [])
+            continue
         if finding["type"] == "too_short" and finding.get("ctx", {}).get("actual_length") != len(finding["input"]):
             continue  # its items have separate errors
         keys = list(finding["loc"]) if data is None else _keys_in_file(finding["loc"], data, finding["type"])
         where = key_place(keys)
         match finding["type"]:
             case "missing":
-                heading = _HEADINGS.get(str(keys[-1]))
+                heading = None if record else _HEADINGS.get(str(keys[-1]))
                 remedy = f": add at least one {heading}" if heading else ""
                 found.setdefault((f"{where} is missing{remedy}", ""), [])
             case "extra_forbidden":
-                found.setdefault((f"{where} is not a known key{unknown(keys)}", ""), [])
+                found.setdefault((f"{where} {_NOT_KNOWN} {'field' if record else 'key'}{unknown(keys)}", ""), [])
             case "value_error":
                 reason = finding["msg"].removeprefix("Value error, ")
                 found.setdefault((f"{where}: {reason}" if where else reason, ""), [])
             case _:
                 choices = found.setdefault((where, _given_text(finding)), [])
-                choices += [wanted for wanted in (_expected_text(finding, keys),) if wanted not in choices]
+                wanted = (record and _expected_record(finding, keys, record)) or _expected_text(finding, keys)
+                choices += [wanted] if wanted not in choices else []
     return [
         f"{start} should be {' or '.join(choices)}{given}".strip() if choices else start
         for (start, given), choices in found.items()
     ]
+
+
+def _record_alone(finding: Finding, fields: dict[str, Any]) -> str:
+    """Return the field that has one record where a list of records is expected; pydantic lists its values."""
+    # an error of the whole record has no place
+    field, *inside = finding["loc"] or ("",)
+    listed = isinstance(inside[0], int) if inside else finding["type"] == "too_short"
+    return str(field) if listed and isinstance(fields.get(field), BaseModel) else ""
+
+
+def _expected_record(finding: Finding, keys: Keys, record: type[BaseModel]) -> str:
+    """Return the records that a Python program can give at a place: "a Camera"; "" for a place of other values."""
+    if finding["type"] not in _TABLES:
+        return ""
+    records = [record]
+    for key in keys:
+        if isinstance(key, str):
+            fields = [one.model_fields[key].annotation for one in records if key in one.model_fields]
+            records = [each for annotation in fields for each in _records_of(annotation)]
+    names = " or ".join(", ".join(each.__name__ for each in records).rsplit(", ", 1))
+    listed = "a list of " if finding["type"] == "tuple_type" else "an " if names[:1] in "AEIO" else "a "
+    return f"{listed}{names}" if names else ""
+
+
+def _records_of(annotation: Any) -> list[type[BaseModel]]:
+    """Return the records that an annotation names."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return list(dict.fromkeys(each for part in get_args(annotation) for each in _records_of(part)))
 
 
 def _expected_text(finding: Finding, keys: Keys) -> str:
