@@ -54,7 +54,7 @@ LENS_FILES = {
         lens(a=("thickness = 2.0", "thickness = 2.0, figure = { zernike_nm = { 99 = 1 } }")), "'99' is no term"),
     "figure image that is not there": (
         lens(a=("thickness = 2.0", 'thickness = 2.0, figure = { image = "no.png", peak_valley_nm = 9 }')),
-        "no such figure image"),
+        "no.png does not exist; give"),
     "scatter that is no table": (LENS.replace("rows = [", "scatter = 1\nrows = [", 1), "scatter is 1"),
     "scatter of an unknown model": (LENS + '[scatter]\nmodel = "fog"\n', "scatter: model"),
     "scatter with a misspelt key": (LENS + "[scatter]\nroughnes_nm = 1\n", "did you mean 'roughness_nm'"),
@@ -577,7 +577,7 @@ def test_why_a_file_is_refused_is_one_json_object_too(capsys, folder, kind):
 
 def test_an_iris_image_that_a_lens_file_names_is_looked_for(capsys, folder):
     (folder / "bad.toml").write_text(LENS + '[iris]\nmask = "nowhere.png"\n')
-    refuse(capsys, folder, ["lens", "check", "bad.toml"], "nowhere.png: there is no such iris image")
+    refuse(capsys, folder, ["lens", "check", "bad.toml"], "nowhere.png does not exist; give the path of a PNG")
 
 
 def test_a_binary_project_and_a_folder_as_project(capsys, folder):
@@ -592,6 +592,6 @@ def test_a_binary_project_and_a_folder_as_project(capsys, folder):
 
 
 def test_dirt_that_cannot_be_drawn(capsys, folder):
-    for image, keyword in (("no.png", "no such dirt image"), ("picture.png", "cannot be read as an image")):
+    for image, keyword in (("no.png", "no.png does not exist"), ("picture.png", "cannot be read as an image")):
         (folder / "bad.toml").write_text(PROJECT + f'[dirt]\nimage = "{image}"\n[quality]\nmode = "draft"\n')
         refuse(capsys, folder, ["render", "--project", "bad.toml", "-o", "a.exr"], keyword)

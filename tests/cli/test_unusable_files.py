@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -91,7 +93,7 @@ def test_a_missing_iris_image_is_refused_with_the_lens_file_that_names_it(capsys
     (folder / "masked.toml").write_text(LENS + '[iris]\nmask = "nowhere.png"\n')
     reported = refused(capsys, ["lens", "check", "masked.toml"])
     assert "masked.toml: " in reported
-    assert "nowhere.png: there is no such iris image" in reported
+    assert "nowhere.png does not exist; give the path of a PNG" in reported
 
 
 KINDS = {
@@ -192,3 +194,30 @@ def test_a_rule_that_chooses_nothing_is_refused_by_the_judge_too(capsys, folder)
     words = ["render", "heliar-tronnier", "--light", "1,1", "--quality", "reference", "--solo", "99-98", "-o", "x.exr"]
     assert "99-98" in refused(capsys, words)
     assert not (folder / "x.exr").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no named pipes among its files")
+@pytest.mark.parametrize("flag", ["--iris-image", "--depth", "--holdout", "--look", "--dirt-image", "--ocio"])
+def test_a_pipe_is_no_file_though_it_exists(capsys, folder, flag):
+    os.mkfifo(folder / "pipe.png")
+    words = ["render", "heliar-tronnier", "--light", "1,1", "--colorspace", "ACES", flag, "pipe.png", "-o", "x.exr"]
+    if flag != "--ocio":
+        words = [word for word in words if word not in ("--colorspace", "ACES")]
+    assert "pipe.png is not a regular file; " in refused(capsys, words)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no named pipes among its files")
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["render", "heliar-tronnier", "--light", "1,1", "-o", "pipe.exr"],
+        ["shot", "--project", "p.toml", "--frames", "1", "-o", "pipe.exr"],
+        ["lens", "convert", "heliar-tronnier", "pipe.toml"],
+    ],
+)
+def test_a_pipe_is_no_output_and_stays(capsys, folder, words):
+    (folder / "p.toml").write_text(PROJECT)
+    pipe = next(folder / word for word in words if word.startswith("pipe"))
+    os.mkfifo(pipe)
+    assert f"cannot write {pipe.name}: it is not a regular file; give a file name" in refused(capsys, words)
+    assert pipe.is_fifo()

@@ -465,7 +465,7 @@ def test_a_picture_that_is_gone_is_named_as_a_person_does(project, tmp_path):
     gone = str(folder / "ridge.png")
     matte = project.replace(holdout=Holdout(image=gone))
     reported = "the matte ridge.png does not exist beside shot.toml; put it there, or choose another on the panel Light"
-    assert in_short(f"{gone}: there is no such holdout image", matte, str(folder / "shot.toml")) == reported
+    assert in_short(f"the holdout image {gone} does not exist", matte, str(folder / "shot.toml")) == reported
     assert in_short("the lens makes no image", matte, None) == "the lens makes no image"
 
 

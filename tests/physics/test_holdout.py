@@ -311,8 +311,8 @@ def test_project_files_keep_it(tmp_path):
 @pytest.mark.parametrize(
     ("holdout", "words"),
     [
-        ("image = 'no.png'", "there is no such holdout image"),
-        ("depth = 'no.exr'", "there is no such holdout depth plate"),
+        ("image = 'no.png'", "no.png does not exist; give"),
+        ("depth = 'no.exr'", "no.exr does not exist; give"),
         ("image = 'p.toml'", "cannot be read as an image"),
         ("depth = 'm.png'", "cannot be read as a depth plate"),
         ("image = 'square.png'", "of another shape than the picture's 120x80"),

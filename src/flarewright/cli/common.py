@@ -162,6 +162,8 @@ def check_place(path: Path, suffix: str | tuple[str, ...]) -> None:
     OutputError
         When the name is empty or has another suffix, its folder does not exist, or it is a folder itself.
     """
+    from ..io.files.atomic_write import check_replaceable
+
     allowed = (suffix,) if isinstance(suffix, str) else suffix
     if path == Path():
         raise OutputError(
@@ -177,6 +179,7 @@ def check_place(path: Path, suffix: str | tuple[str, ...]) -> None:
         )
     if path.suffix.lower() not in allowed:
         raise OutputError(f"the output {str(path)!r} must be named *{' or *'.join(allowed)}")
+    check_replaceable(path)
     if path.parent.exists() and not path.parent.is_dir():
         raise OutputError(f"cannot write {path}: {path.parent} is a file, not a folder; choose another place")
     if not path.parent.is_dir():

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import OutputError, ProjectError
-from ..io.files.door import shown
+from ..io.files.door import no_file, shown
 from ..io.images.exr import ExrContents, read_exr, scale_in_exr
 from ..jobs.frame_list import FramePattern, frames_text
 from ..render.image.compose import add_layer
@@ -156,7 +156,7 @@ def _sequence(text: str, frames: Sequence[int] | None) -> Frames:
     if not pattern.numbered:
         if not Path(text).is_file():
             raise ProjectError(
-                f"{shown(text)} does not exist: check the path, or write #### for the number of the frame"
+                f"{shown(text)} {no_file(text)}: check the path, or write #### for the number of the frame"
             )
         first, last = (1, 1) if frames is None else (min(frames), max(frames))
         return Frames(_absolute(Path(text)), first, last)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
 from ..errors import FlarewrightError, OutputError, ProjectError
+from ..io.files.atomic_write import check_replaceable
 from ..jobs.cluster.executor import open_cluster, workers_of
 from ..jobs.frame_list import FramePattern, chunk_of, frames_text, parse_chunk, parse_frames
 from ..jobs.processes import fitting, shares, work_off
@@ -448,6 +449,7 @@ def _check(shutter_deg: float, subframes: int | None, parts: str) -> None:
 def _check_output(pattern: FramePattern) -> None:
     """Raise an error before the work if the files cannot be written."""
     path = Path(pattern.text)
+    check_replaceable(path)
     if path.suffix.lower() != ".exr":
         raise OutputError(f"the output {pattern.text!r} must be named *.exr, such as flare.####.exr")
     if not path.parent.is_dir():

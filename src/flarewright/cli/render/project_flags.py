@@ -10,6 +10,7 @@ from typing import Any, get_args
 from pydantic import ValidationError
 
 from ...errors import ProjectError
+from ...io.files.door import no_file
 from ...io.lens.coating_text import parse_coating_choice
 from ...io.lens.plate_text import parse_grating, parse_imperfection, parse_plate
 from ...io.project.camera_list import is_camera_name
@@ -128,7 +129,7 @@ def space_flags(flags: RenderOptions, base: Project | None) -> dict[str, Any]:
     from ...render.image.ocio_space import config_name
 
     if flags.ocio is not None and not flags.ocio.is_file():
-        raise ProjectError(f"--ocio {flags.ocio} {_no_file(flags.ocio)}; give an OpenColorIO configuration")
+        raise ProjectError(f"--ocio {flags.ocio} {no_file(flags.ocio)}; give an OpenColorIO configuration")
     config = config_name(None if flags.ocio is None else str(flags.ocio.absolute()))
     return {"colorspace": "rec709", "ocio_space": space, "ocio_config": config}
 
@@ -225,7 +226,7 @@ def _size_px(text: str) -> tuple[int, int]:
 
 def _dirt_image(path: Path) -> str:
     if not path.is_file():
-        raise ProjectError(f"--dirt-image {path} {_no_file(str(path))}; give a grey PNG or EXR image")
+        raise ProjectError(f"--dirt-image {path} {no_file(path)}; give a grey PNG or EXR image")
     return str(path)
 
 
@@ -354,7 +355,7 @@ def _iris(flags: RenderOptions, lens: Any, base: Project | None) -> dict[str, An
     """Return the iris with the flags' changes, or None when no flag changes it."""
     mask = None if flags.iris_image is None else str(flags.iris_image)
     if mask is not None and not Path(mask).is_file():
-        raise ProjectError(f"--iris-image {mask} {_no_file(mask)}; give a grey PNG or EXR image")
+        raise ProjectError(f"--iris-image {mask} {no_file(mask)}; give a grey PNG or EXR image")
     given = _given(flags, "iris")
     if mask is not None:
         given["mask"] = mask
@@ -374,11 +375,6 @@ def _iris(flags: RenderOptions, lens: Any, base: Project | None) -> dict[str, An
     return {**dict(iris), **given}
 
 
-def _no_file(path: str | Path) -> str:
-    """Describe a path that is no file."""
-    return "is a folder" if Path(path).is_dir() else "does not exist"
-
-
 def _holdout(flags: RenderOptions, base: Holdout | None) -> dict[str, Any] | None:
     """Return the occluder with the flags' file, or None when no flag names one."""
     given = {"image": flags.holdout, "depth": flags.depth}
@@ -387,7 +383,7 @@ def _holdout(flags: RenderOptions, base: Holdout | None) -> dict[str, Any] | Non
     for flag, path in (("--holdout", flags.holdout), ("--depth", flags.depth)):
         if path is not None and not path.is_file():
             what = "a grey PNG or EXR image" if flag == "--holdout" else "an EXR depth plate"
-            raise ProjectError(f"{flag} {path} {_no_file(path)}; give {what} in the picture's frame")
+            raise ProjectError(f"{flag} {path} {no_file(path)}; give {what} in the picture's frame")
     if flags.holdout is None and flags.depth is None:
         return None
     kept = dict(base) if base is not None and (base.image is None) == (flags.holdout is None) else {}

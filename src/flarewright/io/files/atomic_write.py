@@ -7,8 +7,8 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from flarewright.errors import OutputError
-
+from ...errors import OutputError
+from .door import no_file
 from .temporary_file import remove_abandoned, temporary_beside
 
 
@@ -20,7 +20,8 @@ def write_atomically(
     Parameters
     ----------
     path : str or Path
-        Target path; an existing file is replaced only when the new one is complete.
+        Target path; an existing file is replaced only when the new one is complete. A symbolic link stays, and the
+        file that it leads to is written, beside which the temporary file lies.
     write : callable
         Gets the temporary path (same folder, same suffix) and writes the whole file there.
     look : callable, optional
@@ -35,7 +36,8 @@ def write_atomically(
     FileExistsError
         When a file exists that must not be replaced.
     OutputError
-        When the folder is missing, read-only or full, or `path` is a folder; no partial file remains.
+        When the folder is missing, read-only or full, or `path` is a folder, a pipe or a device; no partial file
+        remains.
 
     Notes
     -----
@@ -43,12 +45,15 @@ def write_atomically(
     same file is removed first.
     """
     target = Path(path)
-    if target.is_dir():
-        raise OutputError(f"cannot write {target}: it is a folder; give a file name")
+    check_replaceable(target)
     if not target.parent.is_dir():
         raise OutputError(f"cannot write {target}: the folder {target.parent} does not exist; create it first")
-    remove_abandoned(target)
-    temporary = temporary_beside(target)
+    if replace:
+        target = _behind_links(target)
+    # writers choose the format by the suffix that the user gave
+    named = target.with_name(Path(path).name)
+    remove_abandoned(named)
+    temporary = temporary_beside(named)
     try:
         write(temporary)
         if not temporary.is_file():
@@ -68,6 +73,26 @@ def write_atomically(
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def check_replaceable(path: Path) -> None:
+    """Raise an OutputError if an output would replace a folder, a pipe or a device."""
+    reason = no_file(path)
+    if reason in ("is a folder", "is not a regular file"):
+        raise OutputError(f"cannot write {path}: it {reason}; give a file name")
+
+
+def _behind_links(path: Path) -> Path:
+    """Return the path of the file that a symbolic link leads to; any other path as it is."""
+    if not path.is_symlink():
+        return path
+    try:
+        target = path.resolve()
+    except (OSError, RuntimeError):
+        raise OutputError(f"cannot write {path}: it is a link that leads to itself; remove it") from None
+    if not target.parent.is_dir():
+        raise OutputError(f"cannot write {path}: it is a link into the missing folder {target.parent}; create it first")
+    return target
 
 
 def delete_written(path: Path) -> None:

@@ -163,6 +163,18 @@ def expanded(text: str | os.PathLike[str]) -> Path:
         return path
 
 
+def no_file(path: str | os.PathLike[str]) -> str:
+    """Return why a path is no file, the predicate of a sentence that begins with its name; "" for a file."""
+    place = Path(path)
+    if place.is_file():
+        return ""
+    if place.is_dir():
+        return "is a folder"
+    if place.exists():
+        return "is not a regular file"
+    return "is a broken link" if place.is_symlink() else "does not exist"
+
+
 def refuse_claim(path: str | os.PathLike[str], claim: str, needed: float) -> None:
     """Raise if a file would need more memory than the limit.
 
@@ -189,15 +201,15 @@ def refuse_claim(path: str | os.PathLike[str], claim: str, needed: float) -> Non
 def _regular(file: Path, what: str, largest: int | None) -> Path:
     """Return the path of a regular file that is not too large."""
     name = shown(file)
+    remedies = {
+        "is a folder": f", not {what}: give the path of a file",
+        "is a broken link": ": give the path of the file itself",
+        "does not exist": ": check the path and the spelling",
+        "is not a regular file": f": give the path of {what}",
+    }
     try:
-        if file.is_dir():
-            raise FileError(f"{name} is a folder, not {what}: give the path of a file")
-        if file.is_symlink() and not file.exists():
-            raise FileError(f"{name} is a broken link: give the path of the file itself")
-        if not file.exists():
-            raise FileError(f"{name} does not exist: check the path and the spelling")
-        if not file.is_file():
-            raise FileError(f"{name} is not a regular file: give the path of {what}")
+        if (reason := no_file(file)) != "":
+            raise FileError(f"{name} {reason}{remedies[reason]}")
         size = file.stat().st_size
     except (OSError, ValueError) as error:
         if isinstance(error, FileError):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import FileError, OutputError, optional
-from ..files.atomic_write import write_atomically
+from ..files.atomic_write import check_replaceable, write_atomically
 from .decoder import exact_flags, opened
 
 # quality of H.264: a difference of about one code of 255; more bits for dark gradients, which a flare consists of. With
@@ -78,9 +78,9 @@ def check_film_name(path: str | os.PathLike[str]) -> FilmCodec:
     codec = FILM_CODECS.get(place.suffix.lower())
     if codec is None:
         raise OutputError(f"the film {place} must be named *.mp4 (H.264) or *.mov (ProRes 422 HQ)")
-    if place.is_dir() or not place.parent.is_dir():
-        reason = "it is a folder" if place.is_dir() else f"the folder {place.parent} does not exist; create it first"
-        raise OutputError(f"cannot write {place}: {reason}")
+    check_replaceable(place)
+    if not place.parent.is_dir():
+        raise OutputError(f"cannot write {place}: the folder {place.parent} does not exist; create it first")
     av = _module(place)
     if codec.encoder not in av.codecs_available:
         other = next(suffix for suffix in FILM_CODECS if suffix != place.suffix.lower())

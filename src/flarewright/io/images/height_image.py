@@ -8,6 +8,7 @@ import numpy as np
 
 from ...errors import LensError, raised_as
 from ...typing import Floats
+from ..files.door import no_file
 from .mask_image import LARGEST, read_grey
 
 MOST_KNOTS = 128
@@ -35,7 +36,7 @@ def read_heights(path: str | Path) -> tuple[tuple[float, ...], ...]:
     """
     place = Path(path)
     if not place.is_file():
-        raise LensError(f"{place}: there is no such figure image; give the path of a PNG or EXR file")
+        raise LensError(f"the figure image {place} {no_file(place)}; give the path of a PNG or EXR file")
     with raised_as(LensError):
         grey = read_grey(place)
     if min(grey.shape) < 4 or max(grey.shape) > LARGEST:

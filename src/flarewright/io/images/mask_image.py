@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import ProjectError, raised_as
 from ...typing import Floats
-from ..files.door import outside
+from ..files.door import no_file, outside
 from .exr import read_exr_grey
 
 # finer masks cost time without benefit: edges are antialiased
@@ -39,7 +39,7 @@ def read_mask(path: str | Path, what: str = "iris") -> Floats:
     """
     place = Path(path)
     if not place.is_file():
-        raise ProjectError(f"{place}: there is no such {what} image; give the path of a PNG or EXR file")
+        raise ProjectError(f"the {what} image {place} {no_file(place)}; give the path of a PNG or EXR file")
     with raised_as(ProjectError):
         read = read_grey(place)
     if min(read.shape) < 2 or max(read.shape) > LARGEST:

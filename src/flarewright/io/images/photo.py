@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ...errors import FileError, FlarewrightError, OutputError, optional
 from ...model.measurement.capture import Matrix3
 from ...typing import Pixels
-from ..files.door import outside, refuse_claim
+from ..files.door import no_file, outside, refuse_claim
 from ..files.silence_libraries import silenced
 
 _RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".rw2", ".orf", ".pef", ".srw", ".raw", ".crw", ".nrw", ".3fr")
@@ -92,7 +92,7 @@ def open_photo(path: Path, white_level: float | None = None, block: int = 1) -> 
         When the file is missing, damaged, of an unknown format, or not linear.
     """
     if not path.is_file():
-        raise FlarewrightError(f"{path} does not exist: check the path and the spelling")
+        raise FlarewrightError(f"{path} {no_file(path)}: check the path and the spelling")
     suffix = path.suffix.lower()
     if suffix in _RAW:
         photo = _open_raw(path, white_level)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...errors import ProjectError, raised_as
 from ...typing import Pixels
+from ..files.door import no_file
 from .exr import read_exr_plane
 from .half import HALF_MAX
 from .mask_image import read_grey
@@ -86,7 +87,7 @@ def _depth(path: str, _: int) -> Pixels:
 
 def _check(place: Path, what: str, remedy: str) -> None:
     if not place.is_file():
-        raise ProjectError(f"{place}: there is no such holdout {what}; {remedy}")
+        raise ProjectError(f"the holdout {what} {place} {no_file(place)}; {remedy}")
 
 
 def _sized(path: str, pixels: NDArray[np.floating]) -> Pixels:

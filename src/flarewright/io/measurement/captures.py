@@ -28,7 +28,7 @@ from pydantic import ValidationError
 from ...errors import FlarewrightError
 from ...model.measurement.capture import CameraNoise, Capture
 from ...sentences import did_you_mean, summary, validation_sentences
-from ..files.door import expanded, sentences_for
+from ..files.door import expanded, no_file, sentences_for
 from ..files.text_file import read_json, read_text
 from ..files.type_slips import record_of
 from ..images.photo import PHOTO_SUFFIXES, photo_facts
@@ -217,7 +217,7 @@ def _with_exif(
     # in a folder, rows are named by their files, which the messages contain already
     place = "" if where == row["file"] else f"{where}: "
     if not file.is_file():
-        sentence = f"{place}{file} does not exist: check the path and the spelling"
+        sentence = f"{place}{file} {no_file(file)}: check the path and the spelling"
         if "exposure_s" in row and row.get("kind", "light") == "light":
             absent[str(row["file"])] = sentence
             return row

@@ -13,7 +13,7 @@ from ...errors import ProjectError, raised_as
 from ...model import Iris, Look
 from ...model.project.look import CAMERA_KEYS, LIGHT_KEYS, LOOK_SECTIONS
 from ...sentences import INVALID, did_you_mean, summary, validation_sentences
-from ..files.door import expanded
+from ..files.door import expanded, no_file
 from ..files.file_kind import refuse_other_kind
 from ..files.text_file import check_version, read_toml
 from .project_file import project_from_data
@@ -50,8 +50,8 @@ def look_path(name_or_path: str | Path) -> Path:
     path = expanded(text)
     if path.is_file():
         return path
-    if path.suffix or path.parent != Path():
-        raise ProjectError(f"the look {text} does not exist; check the path, or choose one of `flarewright looks`")
+    if path.suffix or path.parent != Path() or path.exists():
+        raise ProjectError(f"the look {text} {no_file(path)}; check the path, or choose one of `flarewright looks`")
     near = difflib.get_close_matches(key, shipped_looks(), n=3, cutoff=0.5)
     hint = f"did you mean {' or '.join(near)}?" if near else "flarewright looks lists them"
     raise ProjectError(f"{text!r} is neither a look of the library nor a file: {hint}")

@@ -13,7 +13,7 @@ from ..._version import __version__
 from ...errors import FileError, ProjectError
 from ...model.project.reference_state import ReferenceState
 from ..files.atomic_write import write_atomically
-from ..files.door import outside_arrays
+from ..files.door import no_file, outside_arrays
 from ..project.project_file import project_from_data
 from ..project.project_text import project_text
 
@@ -64,7 +64,7 @@ def read_reference_state(path: str | Path) -> ReferenceState:
     """
     path = Path(path)
     if not path.is_file():
-        raise ProjectError(f"--resume {path} does not exist; give the state file of an earlier reference render")
+        raise ProjectError(f"--resume {path} {no_file(path)}; give the state file of an earlier reference render")
     try:
         with outside_arrays(path, "a state file of a reference render", "restart without --resume") as archive:
             about = json.loads(str(archive["about"]))

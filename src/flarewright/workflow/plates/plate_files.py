@@ -8,6 +8,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from ...errors import ProjectError
+from ...io.files.door import no_file
 from ...io.files.text_file import digest_of
 from ...io.films.film_file import open_film
 from ...io.films.film_frame import read_film_frame
@@ -87,8 +88,8 @@ def _check_all_there(pattern: FramePattern, frames: Sequence[int], what: str) ->
         raise ProjectError(
             f"{what} {pattern.text} is a folder; give a picture, a film, or a sequence such as p.####.exr"
         )
-    if have is None and not Path(pattern.text).is_file():
-        raise ProjectError(f"{what} {pattern.text} does not exist; check the path and the spelling")
+    if have is None and (reason := no_file(pattern.text)):
+        raise ProjectError(f"{what} {pattern.text} {reason}; check the path and the spelling")
     missing = [] if have is None else [frame for frame in frames if frame not in have]
     if missing:
         there = f"there are {frames_text(sorted(have))[:80]}" if have else "there is none"
