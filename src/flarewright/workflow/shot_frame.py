@@ -316,7 +316,7 @@ def _write(plan: ShotPlan, frame: int, moments: tuple[Project, ...], rendering: 
     ]
     metadata = {
         "version": __version__,
-        "project": project_text(shown),
+        "project": project_text(shown, folder=plan.path(frame).parent),
         "digest": digest,
         "frame": str(frame),
         "subframes": str(len(moments)),

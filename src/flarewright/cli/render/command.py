@@ -383,7 +383,7 @@ def _write(
             (width, height),
             pixel_type=project.output.pixel_type,
             scale=scale,
-            metadata={"version": __version__, "project": project_text(project)},
+            metadata={"version": __version__, "project": project_text(project, folder=output.parent)},
             pixel_aspect=project.camera.pixel_aspect,
             colorspace=space,
             full_windows=full_windows,

@@ -294,7 +294,7 @@ def export_picture(project: Project, path: Path, progress: Progress | None = Non
     layers, space = in_file_space(rendering.layers, project)
     write_exr(
         path, layers, project.camera.size_px, pixel_type=project.output.pixel_type,
-        scale=exr_scale(project), metadata={"version": __version__, "project": project_text(project)},
+        scale=exr_scale(project), metadata=_metadata(project, path),
         pixel_aspect=rendering.project.camera.pixel_aspect, colorspace=space,
         compression=project.output.compression, matte=rendering.matte,
     )  # fmt: skip
@@ -318,8 +318,12 @@ def export_comp(project: Project, path: Path, progress: Progress | None = None) 
     project = project.replace(output=project.output.replace(layers="passes", matte="none"))
     check_comp(project, plate.size_px)
     rendering = render_any(project, progress=progress)
-    metadata = {"version": __version__, "project": project_text(project)}
-    write_comp(path, plate, 1, rendering.layers, project, metadata, {})
+    write_comp(path, plate, 1, rendering.layers, project, _metadata(project, path), {})
+
+
+def _metadata(project: Project, path: Path) -> dict[str, str]:
+    """Return what a picture at a path says of its making."""
+    return {"version": __version__, "project": project_text(project, folder=path.parent)}
 
 
 def lens_text(project: Project) -> str:

@@ -11,7 +11,7 @@ Readers call `text_file.read_toml` or `text_file.read_text` and turn validation 
 - `state_folder`: `state_folder`, the folder for data that outlives a run
 - `tar_members`: `tar_member`, `join_parts`, tar files joined from parts
 - `temporary_file`: `temporary_beside`, `remove_abandoned`, names of unfinished files and their removal after a kill
-- `text_file`: `read_text`, `read_toml`, `read_json`, `read_bytes`, `check_version`
+- `text_file`: `read_text`, `read_toml`, `parsed_toml`, `read_json`, `read_bytes`, `check_version`
 - `toml_errors`: `toml_sentence`, explains TOML syntax errors
 - `type_slips`: `record_of`, makes records without type conversion
 """

@@ -109,7 +109,11 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
     FileError
         The file cannot be read (as in `read_text`) or is not TOML; the message is one sentence with the line.
     """
-    text = read_text(path, what)
+    return parsed_toml(read_text(path, what), path, what)
+
+
+def parsed_toml(text: str, path: str | Path, what: str) -> dict[str, Any]:
+    """Parse TOML of a file; `path` and `what` are for messages, which are those of `read_toml`."""
     name = shown(path)
     for number, line in enumerate(text.split("\n"), 1):
         # a table inside a table inside ...: the parser's memory grows with the square of the depth

@@ -321,6 +321,26 @@ def _contents(file: Any) -> ExrContents:
     return ExrContents(tuple(layers), size, kind, metadata, header, scales[0])
 
 
+def exr_note(path: str | PathLike[str], name: str) -> str | None:
+    """Return one text of the metadata that `write_exr` stored; None if the file has none of this name.
+
+    Only the header is read.
+
+    Raises
+    ------
+    FileError
+        When it is not an EXR file.
+    """
+    import OpenEXR
+
+    with outside(path, "an EXR file", remedy="give an EXR file"):
+        str(path).encode()
+        with _REDIRECT_LOCK, silenced():
+            parts = OpenEXR.File(str(path), header_only=True).parts
+        found = parts[0].header.get(f"{_PREFIX}{name}") if parts else None
+    return found if isinstance(found, str) else None
+
+
 def _of_matte(layer: str, mattes: Sequence[str]) -> bool:
     """Return whether a layer belongs to one of the Cryptomattes."""
     return any(layer.startswith(name) and layer.removeprefix(name).isdecimal() for name in mattes)

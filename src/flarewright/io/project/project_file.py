@@ -56,7 +56,7 @@ def read_project(path: str | os.PathLike[str]) -> Project:
     Parameters
     ----------
     path : path
-        A TOML file.
+        A TOML file, or an EXR that carries its project.
 
     Returns
     -------

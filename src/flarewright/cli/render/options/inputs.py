@@ -17,7 +17,8 @@ class InputOptions:
         str | None, typer.Argument(metavar="LENS", help="A shipped lens, a lens file, or a measured flare (.json).")
     ] = None
     project: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="A project file; flags override its settings.")
+        Path | None,
+        typer.Option(metavar="FILE", help="A project file, or an EXR with its project; flags override its settings."),
     ] = None
     look: Annotated[
         str | None,

@@ -30,7 +30,8 @@ class ShotInputs:
     """What is drawn, and which frames of it. None or empty: not given."""
 
     project: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="A project file; flags override its settings.")
+        Path | None,
+        typer.Option(metavar="FILE", help="A project file, or an EXR with its project; flags override its settings."),
     ] = None
     lens: Annotated[
         str | None, typer.Option(metavar="LENS", help="A shipped lens, a lens file, or a measured flare (.json).")
