@@ -374,6 +374,8 @@ def test_what_is_refused_is_said_in_words(project, name, values, said):
         ("set_iris", {"values": {"rounding": 0.5}}, ""),
         ("set_fields", {"values": {"f_number": 1}}, "f/1 became f/3.5: this lens opens no wider"),
         ("set_fields", {"values": {"f_number": 5.6}}, ""),
+        ("put_look", {"name": "neon-sign"}, "the look's f/2 is wider than "),
+        ("put_look", {"name": "clean-product"}, ""),
         ("set_key", {"light": 0, "at_s": -1.0}, "-1 s became 0 s: a path starts there"),
         ("set_key", {"light": 0, "at_s": 0.123}, "0.123 s became 0.12 s: keys lie at hundredths"),
         ("set_key", {"light": 0, "at_s": 0.07}, ""),

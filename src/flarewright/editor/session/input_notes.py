@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ...model import Project
+from ...render.scene.looks import with_look
 from ..commands.light_path import STEP_S
 from ..commands.shot import STEEPEST_DEG
 
@@ -65,6 +66,12 @@ def _time(values: dict[str, Any], _: Project) -> str:
     return "" if taken == round(asked, 6) else f"{asked:g} s became {taken:g} s: keys lie at hundredths of a second"
 
 
+def _look(values: dict[str, Any], project: Project) -> str:
+    # what does not fit depends on the lens, which a look keeps
+    return "; ".join(with_look(project, values["name"])[1])
+
+
 REPORTED: dict[str, Callable[[dict[str, Any], Project], str]] = {
     "move_light": _light, "set_iris": _iris, "set_fields": _opening, "set_key": _time, "move_key": _time,
+    "put_look": _look,
 }  # fmt: skip
