@@ -26,10 +26,10 @@ from flarewright import (
     shot,
 )
 from flarewright.errors import FlarewrightError, OutputError, ProjectError
-from flarewright.io.images.exr import read_exr
+from flarewright.io.images.exr import read_exr, write_exr
 from flarewright.jobs.answers import Done
 from flarewright.jobs.worker import named
-from flarewright.model import Holdout
+from flarewright.model import Dirt, Holdout, Iris, Layer
 from flarewright.workflow import shot_frame
 from flarewright.workflow.keyframes import project_at, still
 
@@ -300,3 +300,21 @@ def test_a_full_disk_is_one_sentence(tmp_path, monkeypatch):
     with pytest.raises(OutputError, match=r"cannot write .*f\.1\.exr: no space left on device"):
         shot(project(), tmp_path / "f.#.exr", processes=1)
     assert list(tmp_path.iterdir()) == []
+
+
+def too_late(*_):
+    pytest.fail("kernels compile before the error")
+
+
+@pytest.mark.parametrize("kind", ["image", "depth"])
+def test_an_unreadable_file_is_found_before_the_first_frame(kind, tmp_path):
+    write_exr(tmp_path / "h.1.exr", [Layer("beauty", np.ones((36, 64, 3), np.float32), (0, 0, 64, 36), {})], (64, 36))
+    (tmp_path / "h.2.exr").write_text("cut")
+    holdout = Holdout(**{kind: str(tmp_path / "h.#.exr")}, **({"depth_unit_mm": 1.0} if kind == "depth" else {}))
+    with pytest.raises(ProjectError, match=r"h\.2\.exr cannot be read as a holdout"):
+        shot(project(holdout=holdout), tmp_path / "f.#.exr", frames="1-2", processes=1, prepare=too_late)
+    broken = str(tmp_path / "h.2.exr")
+    for changes in ({"iris": Iris(mask=broken)}, {"dirt": Dirt(image=broken)}, {"holdout": Holdout(**{kind: broken})}):
+        with pytest.raises(FlarewrightError, match=r"h\.2\.exr cannot be read as"):
+            shot(project(**changes), tmp_path / "f.#.exr", processes=1, prepare=too_late)
+    assert not list(tmp_path.glob("f.*"))

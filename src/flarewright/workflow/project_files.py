@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from ..render.scene.resolve import ResolvedProject
 
 
-def open_project_files(file: Path, project: Project) -> ResolvedProject:
+def open_project_files(file: Path | str, project: Project) -> ResolvedProject:
     """Read all files that a project's render reads.
 
     Parameters
     ----------
-    file : path
-        File of the project, for messages.
+    file : path or str
+        File of the project, or another name of it, for messages.
     project : Project
         Project with a lens.
 

@@ -343,7 +343,9 @@ def _sequences(project: Project) -> list[FramePattern]:
 
 
 def _check_sequences(project: Project, frames: Sequence[int]) -> None:
-    """Raise an error before the work if a frame of a sequence that hides lights is missing."""
+    """Raise an error before the work if a frame of a sequence that hides lights is missing or no picture."""
+    from ..io.images.plate_image import check_header
+
     for pattern in _sequences(project):
         there = set(pattern.on_disk())
         missing = [frame for frame in frames if frame not in there]
@@ -352,6 +354,8 @@ def _check_sequences(project: Project, frames: Sequence[int]) -> None:
                 f"the holdout {pattern.text} lacks frame{'s'[: len(missing) > 1]} {frames_text(missing)[:80]}; give "
                 "frames that exist"
             )
+        for frame in frames:
+            check_header(pattern.path(frame))
 
 
 def shot_frames(
@@ -457,18 +461,24 @@ def _check_output(pattern: FramePattern) -> None:
 
 
 def _check_moments(plan: ShotPlan, frames: Sequence[int]) -> None:
-    """Raise an error now for values that cannot be used together at the first or last frame or at a key."""
+    """Raise an error now for what cannot be used together at the first or last frame or at a key, or not be read."""
     from ..measure.replay.measured_project import is_measured
     from ..render.scene.resolve import resolve_project
+    from .project_files import open_project_files
     from .shot_frame import frame_project
 
     project = plan.project
     times = {time_of(frames[0], project.timeline), time_of(frames[-1], project.timeline)}
     times |= {at_s for curve in project.curves for at_s in curve.at_s}
-    for at_s in sorted(times):
+    for number, at_s in enumerate(sorted(times)):
         moment = frame_project(plan, at_s)
         try:
-            if not is_measured(moment):
+            if is_measured(moment):
+                continue
+            # the files of one moment stand for those of all; frames of sequences are checked by their headers
+            if number == 0:
+                open_project_files("the project", moment)
+            else:
                 resolve_project(moment)
         except FlarewrightError as error:
             raise type(error)(f"at {at_s:g} s: {error}" if at_s else str(error), error.problems) from None

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...errors import ProjectError, raised_as
 from ...typing import Pixels
-from ..files.door import no_file
+from ..files.door import no_file, outside
 from .exr import read_exr_plane
 from .half import HALF_MAX
 from .mask_image import read_grey
@@ -20,6 +20,12 @@ from .mask_image import read_grey
 LARGEST = 16384
 # names of depth channels, in order of preference
 DEPTH_NAMES = (("Z",), ("depth",), ("depth.Z",), ("Depth.Z",), ("R",))
+
+
+def check_header(path: str | os.PathLike[str]) -> None:
+    """Raise ProjectError for a file that is missing, no picture or too large, by its header alone."""
+    with raised_as(ProjectError), outside(path, "a holdout", pixel_bytes=4, remedy="give a PNG or EXR file"):
+        pass
 
 
 def read_matte(path: str | os.PathLike[str]) -> Pixels:
