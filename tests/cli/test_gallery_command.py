@@ -41,7 +41,8 @@ def test_a_gallery_resumes_and_redraws_changes(two_cards, tmp_path, capsys):
         assert card.title in page
         assert f'src="{card.kind}-{card.name}.png"' in page
     with Image.open(folder / "contact-sheet.png") as sheet:
-        assert sheet.size == (4 * 32, 18 + 26)
+        # columns are wider than pictures whose titles do not fit
+        assert sheet.size == (4 * 320, 18 + 26)
     assert two_cards == [KNOWN[0].name, KNOWN[-1].name]
     (folder / f"lens-{KNOWN[0].name}.png").unlink()
     assert run(["gallery", "-o", str(folder), "--size", "32x18"]) == 0
@@ -145,3 +146,23 @@ def test_the_program_alone_lays_out_the_pictures_that_ship(tmp_path, monkeypatch
 
 def _full(_folder):
     raise OSError("no space left")
+
+
+def test_a_damaged_list_of_pictures_is_written_again(two_cards, tmp_path):
+    words = ["gallery", "-o", str(tmp_path), "--size", "16x9"]
+    assert run(words) == 0
+    whole = (tmp_path / "gallery.json").read_text()
+    deep = f'"old.png": {"[" * 900}{"]" * 900}'
+    for damage in (
+        '"old.png": 1e999',
+        '"old.png": {"of": 1e999, "sha256": ""}',
+        f'"old.png": {deep}',
+        '"old.png": "a"',
+    ):
+        (tmp_path / "gallery.json").write_text(whole.replace("{", f"{{{damage},", 1))
+        # the list is written with the next picture
+        (tmp_path / f"lens-{KNOWN[0].name}.png").unlink()
+        assert run(words) == 0
+        again = (tmp_path / "gallery.json").read_text()
+        assert "Infinity" not in again
+        assert json.loads(again).keys() == json.loads(whole).keys()

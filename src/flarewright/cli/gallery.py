@@ -26,6 +26,7 @@ EPILOG = "Example: flarewright gallery -o gallery --size 640x360"
 TITLE = "Flarewright: lenses and looks"
 SECTIONS = {"lens": "Lenses, as photographed", "look": "Looks"}
 _DONE = "gallery.json"
+_ENTRY = {"of", "sha256"}
 
 
 def gallery(
@@ -56,7 +57,7 @@ def gallery(
             file = f"{card.kind}-{card.name}.png"
             whole = digest_of(output / file)
             if done.get(file) != {"of": stamp, "sha256": whole}:
-                if whole is not None and isinstance(kept := done.get(file), dict) and kept.get("of") == stamp:
+                if whole is not None and done.get(file, {}).get("of") == stamp:
                     print_remarks([f"{output / file} is damaged or was changed; it is rendered again"])
                 _render(card, size_px, output / file)
                 done[file] = {"of": stamp, "sha256": digest_of(output / file)}
@@ -138,13 +139,20 @@ def _stamp(card: Card, size_px: Sequence[int]) -> str:
 
 
 def _read_done(path: Path) -> dict[str, Any]:
+    """Return the stamps of the finished pictures by file; entries of any other form, in a damaged list, are dropped."""
     from ..io.files.text_file import read_json
 
     try:
         found = read_json(path, "a list of pictures")
     except FlarewrightError:
         return {}
-    return found if isinstance(found, dict) else {}
+    if not isinstance(found, dict):
+        return {}
+    return {
+        file: entry
+        for file, entry in found.items()
+        if isinstance(entry, dict) and entry.keys() == _ENTRY and all(isinstance(text, str) for text in entry.values())
+    }
 
 
 def _make(folder: Path) -> None:
