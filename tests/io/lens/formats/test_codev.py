@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import pytest
 
@@ -145,6 +146,17 @@ def test_what_is_not_supported_is_one_sentence(tmp_path, old, new, said):
     with pytest.raises(LensError) as raised:
         opened(tmp_path, DOUBLET.replace(old, new, 1))
     assert said in " | ".join([str(raised.value), *raised.value.problems])
+
+
+def test_words_can_be_in_lower_case(tmp_path):
+    small = opened(tmp_path, re.sub(r"\b(?!NBK7|673)[A-Z]+\b", lambda word: word[0].lower(), DOUBLET))
+    assert small.lens.rows == opened(tmp_path, DOUBLET).lens.rows
+
+
+def test_a_file_of_one_mirror_is_called_one(tmp_path):
+    text = "len\ntit 'f/8, 200mm paraboloid'\ndim m\nrdm y\nso 0. 1e+11\ns -400 -200 refl\ncon\nk -1\nsi 0 0\nfno 8.0\n"
+    with pytest.raises(LensError, match="surface 1 is a mirror: reflecting surfaces are not supported"):
+        opened(tmp_path, text)
 
 
 def test_a_command_can_name_its_surface(tmp_path):

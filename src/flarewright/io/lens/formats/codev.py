@@ -192,7 +192,7 @@ def _rim(surface: _Surface, words: list[str], reading: _Reading) -> None:
 
 def _sequence(path: Path, reading: _Reading, first_column: FirstColumn | None) -> RawSequence | None:
     surfaces, problems = reading.surfaces, reading.problems
-    if len(surfaces) < 4:
+    if len(surfaces) < 4 and not any(map(_is_mirror, surfaces)):
         problems.append("the surfaces of object, lens and image (SO, S, SI) are missing: is it a CODE V .seq file?")
     elif len(surfaces) > MOST_SURFACES:
         problems.append(f"it has {len(surfaces)} surfaces, a lens has at most {MOST_SURFACES}")
@@ -252,7 +252,7 @@ def _row(surface: _Surface, mm: float, radii: bool, reading: _Reading) -> Sequen
         problems.append(f"{where}: the gap to the next surface is infinite, so they form no lens: give its length")
     medium = None
     rest = surface.words[2:]
-    if any(word.upper() in ("REFL", "REFR:REFL", "TIR") for word in rest):
+    if _is_mirror(surface):
         problems.append(f"{where} is a mirror: reflecting surfaces are not supported")
     elif rest:
         medium = _medium(rest[0], surface.number, reading)
@@ -264,6 +264,10 @@ def _row(surface: _Surface, mm: float, radii: bool, reading: _Reading) -> Sequen
         thickness=thickness * mm, medium=medium, semi_diameter=None if surface.rim is None else surface.rim * mm,
         asphere=tuple(surface.terms.get(k, 0.0) / mm ** (2 * k + 3) for k in range(most + 1)),
     )  # fmt: skip
+
+
+def _is_mirror(surface: _Surface) -> bool:
+    return any(word.upper() in ("REFL", "REFR:REFL", "TIR") for word in surface.words[2:])
 
 
 def _kind(radii: bool) -> str:
