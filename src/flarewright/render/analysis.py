@@ -13,7 +13,11 @@ from ..optics.lens.paraxial import FirstOrder, first_order
 from ..optics.rays.bundle import least_distance
 from ..optics.rays.ghost_table import GhostQuery, GhostTable, ghost_table, pack_for_query
 from ..optics.rays.pack import SensorMirror
+from ..typing import Progress
 from .scene.resolve import build, check_opens, open_lens
+
+# part of the work that searches the paths of four reflections
+_SEARCH_PART = 0.1
 
 
 def paraxial(
@@ -119,7 +123,13 @@ def ghosts(
 
 
 def find_ghosts(
-    lens: Lens, order: FirstOrder, coating: CoatingChoice, query: GhostQuery, *, threads: int | None = None
+    lens: Lens,
+    order: FirstOrder,
+    coating: CoatingChoice,
+    query: GhostQuery,
+    *,
+    threads: int | None = None,
+    progress: Progress | None = None,
 ) -> tuple[GhostTable, tuple[str, ...]]:
     """Analyse every ghost of a lens that is built, including those of four reflections on request.
 
@@ -132,6 +142,8 @@ def find_ghosts(
     coating : CoatingChoice
     query : GhostQuery
     threads : int, optional
+    progress : callable, optional
+        Called with the finished fraction (0 to 1) and a description.
 
     Returns
     -------
@@ -155,11 +167,12 @@ def find_ghosts(
             f"give more than {least_distance(packed):.4g} mm"
         )
     if query.orders == 2:
-        return ghost_table(lens, packed, query, threads=threads), ()
+        return ghost_table(lens, packed, query, threads=threads, progress=progress), ()
     from .reference.four_reflections import find_four_reflections_unbounded
 
-    found = find_four_reflections_unbounded(lens, packed, query, threads=threads)
-    table = ghost_table(lens, packed, query, others=found.paths, threads=threads)
+    search, rest = _between(progress, 0.0, _SEARCH_PART), _between(progress, _SEARCH_PART, 1.0)
+    found = find_four_reflections_unbounded(lens, packed, query, threads=threads, progress=search)
+    table = ghost_table(lens, packed, query, others=found.paths, threads=threads, progress=rest)
     # remove the rows below the limit
     two = sum(row.throughput_mm2 for row in table.ghosts if not row.later_reflections)
     rows = [row for row in table.ghosts if not row.later_reflections or row.throughput_mm2 > query.order4_limit * two]
@@ -169,3 +182,10 @@ def find_ghosts(
         f"{part:.1%} of that are not listed"
     )
     return replace(table, ghosts=tuple(rows)), (remark,)
+
+
+def _between(progress: Progress | None, start: float, end: float) -> Progress | None:
+    """Return the callback of a part of the work."""
+    if progress is None:
+        return None
+    return lambda part, words: progress(start + (end - start) * part, words)

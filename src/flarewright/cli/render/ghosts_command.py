@@ -12,13 +12,24 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ...errors import ProjectError
-from ..common import chosen_fstop, console, field_angles, first_run_bar, pair, picture_size, print_json, print_remarks
+from ..common import (
+    chosen_fstop,
+    console,
+    field_angles,
+    first_run_bar,
+    one_bar,
+    pair,
+    picture_size,
+    print_json,
+    print_remarks,
+)
 from ..option_record import with_options
 from ..shared_options import FNumber, Json, KnownLens, Zoom
 
 if TYPE_CHECKING:
     from ...model import Lens, Project
     from ...optics.rays.ghost_table import GhostQuery, GhostRow, GhostTable
+    from ...workflow.ghost_sweep import SweepPoint
 
 EPILOG = (
     "Examples:\n\nflarewright ghosts heliar-tronnier --light 10,0\n\n"
@@ -137,7 +148,8 @@ def ghosts(options: GhostsOptions) -> None:
         print_remarks(dict.fromkeys((*opened.remarks, *settled.remarks)))
         _sweep(options, project, query, opened.lens.name)
         return
-    table, found = find_ghosts(settled.lens, settled.order, settled.coating, query)
+    with one_bar("ghosts") as progress:
+        table, found = find_ghosts(settled.lens, settled.order, settled.coating, query, progress=progress)
     veil = None
     if options.glare:
         from ...render.scattering.veiling_glare import veiling_glare
@@ -247,9 +259,14 @@ def _sweep(options: GhostsOptions, project: Project, query: GhostQuery, name: st
 
     axes = sweep_axes(options.sweep or ())
     fields = (query.field_deg,) if axes.field is None else along(query.field_deg, axes.field)
-    points = tuple(
-        sweep_ghosts(project, query, fields, axes.wavelength or (query.wavelength_nm,), axes.fstop or (options.fstop,))
-    )
+    wavelengths, f_numbers = axes.wavelength or (query.wavelength_nm,), axes.fstop or (options.fstop,)
+    number = len(fields) * len(wavelengths) * len(f_numbers)
+    points: list[SweepPoint] = []
+    with one_bar("sweep") as progress:
+        for point in sweep_ghosts(project, query, fields, wavelengths, f_numbers):
+            points.append(point)
+            if progress is not None:
+                progress(len(points) / number, f"{len(points)} of {number}")
     if options.as_csv:
         print(sweep_csv(points), end="")
         return

@@ -15,7 +15,7 @@ from ...kernels.raster.bundle import draw_bundle, measure_bundle, node_densities
 from ...kernels.raster.polygons import blank_plane, to_pixels
 from ...kernels.tracing.sequential import ALIVE, REL, STOP_X, WEIGHT, X, Y
 from ...model import CoatingChoice, Iris, Lens
-from ...typing import Floats, Indices, Mask
+from ...typing import Floats, Indices, Mask, Progress
 from ..lens.dispersion import D_LINE_NM
 from ..lens.paraxial import FirstOrder, path_matrices
 from ..lens.paths import LightPath, direct_path, ghost_paths
@@ -169,7 +169,13 @@ def pack_for_query(lens: Lens, order: FirstOrder, coating: CoatingChoice, query:
 
 
 def ghost_table(
-    lens: Lens, packed: PackedLens, query: GhostQuery, *, others: Sequence[LightPath] = (), threads: int | None = None
+    lens: Lens,
+    packed: PackedLens,
+    query: GhostQuery,
+    *,
+    others: Sequence[LightPath] = (),
+    threads: int | None = None,
+    progress: Progress | None = None,
 ) -> GhostTable:
     """Analyse all two-reflection ghosts of a lens for one light, and the given paths of four reflections.
 
@@ -183,6 +189,8 @@ def ghost_table(
         Paths of four reflections.
     threads : int, optional
         None: all cores; results do not depend on it.
+    progress : callable, optional
+        Called after each path with the finished fraction (0 to 1) and the path's name.
 
     Returns
     -------
@@ -199,7 +207,11 @@ def ghost_table(
     packed = facing(packed, light.axes, light.nearness)
     todo = (direct_path(lens), *ghost_paths(lens, query.paths, sensor=query.sensor is not None), *others)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        measured = list(pool.map(lambda path: _measure(lens, packed, path, light), todo))
+        measured = []
+        for row in pool.map(lambda path: _measure(lens, packed, path, light), todo):
+            measured.append(row)
+            if progress is not None:
+                progress(len(measured) / len(todo), row.name)
     direct = measured[0]
     # peaks are relative to the direct image's flux; without one they are 0
     unit = direct.throughput_mm2 if direct.throughput_mm2 > 0.0 else float("inf")

@@ -23,6 +23,7 @@ from ...optics.pupil.iris import blade_edges
 from ...optics.rays.bundle import incidence
 from ...optics.rays.ghost_table import GhostQuery
 from ...optics.rays.pack import PackedLens, facing
+from ...typing import Progress
 from ..scene.opening import Opening
 from ..scene.shot import Shot
 from .batches import Batch, batches_in_order, ray_source, run_batch
@@ -85,7 +86,14 @@ class FourReflections:
 
 
 def find_four_reflections(
-    lens: Lens, shots: Sequence[Shot], limit: float, seed: int, *, which: str = "all", threads: int | None = None
+    lens: Lens,
+    shots: Sequence[Shot],
+    limit: float,
+    seed: int,
+    *,
+    which: str = "all",
+    threads: int | None = None,
+    progress: Progress | None = None,
 ) -> FourReflections:
     """Search the four-reflection paths that bring light into the picture.
 
@@ -100,6 +108,8 @@ def find_four_reflections(
         Relative to the stop, as in `ghost_paths`.
     threads : int, optional
         None: all cores. The result does not depend on it.
+    progress : callable, optional
+        Called after each batch of rays with the finished fraction (0 to 1) and a description.
     """
     sources = [ray_source(shot, seed, side=SIDE, light=k, followed=FOLLOWED) for k, shot in enumerate(shots)]
     search, estimate = _Tally(), _Tally()
@@ -110,10 +120,11 @@ def find_four_reflections(
             search.add(result)
         wanted = search.batches_for(limit)
         batches = min(wanted, MOST_BATCHES)
-        for result in islice(results, batches - PILOT):
-            search.add(result)
-        for result in islice(results, max(PILOT, batches // ESTIMATE_DIVISOR)):
-            estimate.add(result)
+        more = max(PILOT, batches // ESTIMATE_DIVISOR)
+        for k, result in enumerate(islice(results, batches - PILOT + more)):
+            (search if k < batches - PILOT else estimate).add(result)
+            if progress is not None:
+                progress((PILOT + k + 1) / (batches + more), "four reflections")
     rows = len(shots[0].packed.curvature)
     bright = [key for key, flux in search.flux.items() if flux > MARGIN * limit * search.two]
     bright.sort(key=lambda key: (-search.flux[key], key))
@@ -128,7 +139,12 @@ def find_four_reflections(
 
 
 def find_four_reflections_unbounded(
-    lens: Lens, packed: PackedLens, query: GhostQuery, *, threads: int | None = None
+    lens: Lens,
+    packed: PackedLens,
+    query: GhostQuery,
+    *,
+    threads: int | None = None,
+    progress: Progress | None = None,
 ) -> FourReflections:
     """Search the four-reflection paths that bring light to an unbounded sensor plane, through a round stop.
 
@@ -139,6 +155,8 @@ def find_four_reflections_unbounded(
         At one wavelength, not yet rotated to the light.
     query : GhostQuery
     threads : int, optional
+    progress : callable, optional
+        As of `find_four_reflections`.
     """
     seen, semi = incidence(query.field_deg, query.distance, packed.first_order.entrance_pupil_z), packed.stop_semi
     blades = blade_edges(Iris(), semi)
@@ -148,7 +166,9 @@ def find_four_reflections_unbounded(
     # one pixel with a side of 1000 km
     plane = np.array([0.5, 0.5, 1e-9, 1e-9])
     shot = Shot(line, seen, facing(packed, seen.axes, seen.nearness), opening, plane, (1, 1), "rec709")
-    return find_four_reflections(lens, [shot], query.order4_limit, 0, which=query.paths, threads=threads)
+    return find_four_reflections(
+        lens, [shot], query.order4_limit, 0, which=query.paths, threads=threads, progress=progress
+    )
 
 
 class _Tally:

@@ -1,0 +1,24 @@
+"""The analysis of ghosts reports its progress, which rises to 1; the result does not depend on it."""
+
+import pytest
+
+from flarewright.model import AsLens
+from flarewright.optics.lens.paraxial import first_order
+from flarewright.optics.rays.ghost_table import GhostQuery
+from flarewright.render.analysis import find_ghosts
+from flarewright.render.scene.resolve import load_lens
+
+
+@pytest.mark.parametrize("orders", [2, 4])
+def test_progress_rises_to_the_end(orders):
+    lens = load_lens("triplet-pestrecov")
+    query = GhostQuery((8.0, 5.0), orders=orders, order4_limit=1e-2)
+    seen = []
+    given = (lens, first_order(lens), AsLens(), query)
+    table, _ = find_ghosts(*given, progress=lambda part, words: seen.append((part, words)))
+    parts = [part for part, _ in seen]
+    assert parts == sorted(parts)
+    assert parts[-1] == 1.0
+    assert len(seen) >= 1 + len(table.ghosts)
+    assert all(words for _, words in seen)
+    assert find_ghosts(*given)[0] == table
