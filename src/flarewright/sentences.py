@@ -51,6 +51,8 @@ _FIXED_LENGTHS = (2, 3)
 # findings of a value where a file has a table, or several
 _TABLES = ("model_type", "model_attributes_type", "union_tag_not_found", "tuple_type")
 _NOT_KNOWN = "is not a known"
+# fields of a record that a sentence lists
+_MOST_LISTED = 6
 
 # lists whose entries have separate headings in TOML
 _HEADINGS = {
@@ -101,7 +103,8 @@ def record_sentences(error: ValidationError, record: type[BaseModel], fields: di
     known = tuple(record.model_fields)
 
     def suggestion(keys: Keys) -> str:
-        return (did_you_mean(str(keys[0]), known) or f"; known are {', '.join(known)}") if len(keys) == 1 else ""
+        listed = f"; known are {', '.join(known)}" if len(known) <= _MOST_LISTED else ""
+        return (did_you_mean(str(keys[0]), known) or listed) if len(keys) == 1 else ""
 
     return sorted(_sentences(error, fields, suggestion, record), key=lambda each: _NOT_KNOWN not in each)
 
