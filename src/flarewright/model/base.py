@@ -24,7 +24,7 @@ class Frozen(BaseModel):  # noqa: PLW1641
     if not TYPE_CHECKING:
 
         def __init__(self, /, **fields: Any) -> None:
-            """Raise one sentence in the place of pydantic's lines."""
+            """Raise one sentence instead of pydantic's lines."""
             try:
                 super().__init__(**fields)
             except ValidationError as error:

@@ -1,4 +1,4 @@
-"""A file is written completely or not at all, through a symbolic link, and never in the place of a pipe."""
+"""A file is written completely or not at all, through a symbolic link, and never replaces a pipe."""
 
 import os
 import sys
