@@ -9,14 +9,13 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
-from itertools import pairwise
 from mmap import mmap
 from typing import Annotated, Any
 
 import typer
 
 from .. import __version__
-from ..errors import FlarewrightError, OutputError
+from ..errors import FlarewrightError
 from ..kernels.jit.warmup_processes import head_start
 from . import dataset, edit, gallery, looks, warm_up
 from .common import end_as_interrupted, end_at_once, was_interrupted
@@ -272,7 +271,6 @@ def _rings(words: Sequence[str]) -> bool:
 def _call(words: list[str]) -> int:
     """Convert every expected end of a command to an exit code, with one sentence on stderr."""
     try:
-        _check_outputs(words)
         with _hiding_interrupts():
             code: Any = app(args=words, prog_name="flarewright", standalone_mode=False)
     except FlarewrightError as error:
@@ -313,12 +311,6 @@ def _call(words: list[str]) -> int:
     if code == 130:
         print(f"flarewright: interrupted; nothing was left half-written{_resuming(words)}", file=sys.stderr)
     return code if isinstance(code, int) else 0
-
-
-def _check_outputs(words: Sequence[str]) -> None:
-    """Refuse an empty name after -o: as a path it is the present folder, which `-o "$UNSET"` would fill."""
-    if any(flag in ("-o", "--output") and not name for flag, name in pairwise(words)) or "--output=" in words:
-        raise OutputError("the name of the output is empty; give a file or a folder")
 
 
 def _system_sentence(error: OSError) -> str:

@@ -16,6 +16,7 @@ from ..errors import ProjectError
 from .common import check_place, first_run_bar, print_json, print_remark, print_remarks, progress_bar
 from .option_record import with_options
 from .progress_lines import ProgressLines
+from .shared_options import output_option
 
 if TYPE_CHECKING:
     from ..model import Project
@@ -37,7 +38,7 @@ class DatasetOptions:
     """Options of `flarewright dataset`. None: not given."""
 
     spec: Annotated[Path | None, typer.Argument(metavar="SPEC.toml", help="The distributions to draw from.")] = None
-    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder of the data set.")] = None
+    output: Annotated[Path | None, output_option(metavar="DIR", help="Folder of the data set.")] = None
     items: Annotated[
         int | None, typer.Option("-n", "--items", min=1, help="Number of items (default: 100; of a preview 8).")
     ] = None

@@ -13,7 +13,7 @@ import typer
 
 from ..errors import FlarewrightError, OutputError
 from .common import picture_size, print_json, print_remark, print_remarks, progress_bar, write_text
-from .shared_options import Json
+from .shared_options import Json, output_option
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,7 +30,7 @@ _ENTRY = {"of", "sha256"}
 
 
 def gallery(
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="The folder; created if missing.")],
+    output: Annotated[Path, output_option(metavar="DIR", help="The folder; created if missing.")],
     size: Annotated[
         str, typer.Option(metavar="WxH", help="Size of each picture, in pixels (default: 480x270).")
     ] = "480x270",

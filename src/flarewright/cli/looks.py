@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .common import check_free, check_place, console, print_json, print_remarks, write_text
-from .shared_options import Force, Json
+from .shared_options import Force, Json, output_option
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -64,7 +64,7 @@ def looks(context: typer.Context, as_json: Json = False) -> None:
 
 def save(
     project: Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file.")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="LOOK.toml", help="The look.")],
+    output: Annotated[Path, output_option(metavar="LOOK.toml", help="The look.")],
     name: Annotated[str | None, typer.Option(help="Name of the look (default: that of the file).")] = None,
     notes: Annotated[str, typer.Option(help="A sentence on its contents.")] = "",
     force: Force = False,

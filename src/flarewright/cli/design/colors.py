@@ -11,7 +11,7 @@ import typer
 from ...errors import ProjectError
 from ..common import check_place, console, one_of, print_json, print_remarks, stop_on_interrupt
 from ..option_record import with_options
-from ..shared_options import Json, Threads
+from ..shared_options import Json, Threads, output_option
 from .checks import check_color_fitness, check_films, check_time
 from .options import Seed
 from .partial_work import partial_work
@@ -34,7 +34,7 @@ class ColorOptions:
     """Options of `flarewright design colors`."""
 
     project: Annotated[Path, typer.Argument(metavar="PROJECT", help="A project file with a \\[design].")]
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="LENS.toml", help="The coated lens.")]
+    output: Annotated[Path, output_option(metavar="LENS.toml", help="The coated lens.")]
     films: Annotated[
         str,
         typer.Option(

@@ -9,9 +9,9 @@ import typer
 
 from ...errors import ProjectError
 from ..common import check_place, chosen_fstop, console, one_of, print_remarks
-from ..shared_options import FNumber, KnownLens
+from ..shared_options import FNumber, KnownLens, output_option
 
-Output = Annotated[Path, typer.Option("-o", "--output", metavar="LENS.toml", help="The changed lens.")]
+Output = Annotated[Path, output_option(metavar="LENS.toml", help="The changed lens.")]
 
 
 def resize(

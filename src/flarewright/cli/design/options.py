@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from ...design.solvers.restart_limit import MOST_RESTARTS
+from ..shared_options import output_option
 
-Output = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for lenses and report.")]
+Output = Annotated[Path, output_option(metavar="DIR", help="Folder for lenses and report.")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of the random numbers (default: 0).")]
 Time = Annotated[
     float, typer.Option("--time", help="Seconds to search; Ctrl-C ends the search earlier and keeps the best.")

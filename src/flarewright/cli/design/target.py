@@ -11,7 +11,7 @@ import typer
 from ...errors import ProjectError
 from ...workflow.defaults import WIDTH_MM
 from ..common import check_free, check_place, field_angles, print_json, print_remarks, write_text
-from ..shared_options import Force, Json
+from ..shared_options import Force, Json, output_option
 from .checks import check_sensor_width
 from .options import MostGhosts
 
@@ -26,7 +26,7 @@ def target(
     source: Annotated[
         Path, typer.Argument(metavar="PICTURE|MODEL.json", help="A photograph, or a ghost model of measure fit.")
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="PROJECT.toml", help="The project.")],
+    output: Annotated[Path, output_option(metavar="PROJECT.toml", help="The project.")],
     light: Annotated[
         list[str],
         typer.Option(metavar="X,Y", help="Field angles in degrees, right and up; may be repeated for a model."),

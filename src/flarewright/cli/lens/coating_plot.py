@@ -9,7 +9,7 @@ import typer
 
 from ...errors import ProjectError
 from ..common import check_place, console, print_json, print_remarks
-from ..shared_options import Json
+from ..shared_options import Json, output_option
 
 if TYPE_CHECKING:
     from ...model import Coating
@@ -32,9 +32,7 @@ def plot(
     glass: Annotated[
         str, typer.Option(metavar="NAME|N", help="Catalogue glass, or an index for all wavelengths.")
     ] = "N-BK7",
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="OUT.svg|png", help="Draw the curves into this file.")
-    ] = None,
+    output: Annotated[Path | None, output_option(metavar="OUT.svg|png", help="Draw the curves into this file.")] = None,
     as_json: Json = False,
 ) -> None:
     """Print the reflectance of a coated glass surface in air, by wavelength and angle, and its colour."""

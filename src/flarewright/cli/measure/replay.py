@@ -9,7 +9,7 @@ import typer
 
 from ...errors import FlarewrightError
 from ..common import check_place, picture_size, print_json, print_remarks
-from ..shared_options import Json
+from ..shared_options import Json, output_option
 
 if TYPE_CHECKING:
     from ...model.measurement.replay_camera import ReplayCamera
@@ -19,7 +19,7 @@ EPILOG = "Example:\n\nflarewright measure replay model.json --constellation 12.3
 
 def replay(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="A ghost model of `measure run`.")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT.exr", help="The picture to write.")],
+    output: Annotated[Path, output_option(metavar="OUT.exr", help="The picture to write.")],
     constellation: Annotated[float | None, typer.Option(help="Degrees between the optical axis and the light.")] = None,
     roll: Annotated[
         float | None, typer.Option(help="Direction of the light, degrees counterclockwise from the right (0).")

@@ -9,7 +9,7 @@ import typer
 
 from ...errors import FlarewrightError
 from ..common import check_place, print_json, print_remarks
-from ..shared_options import Json
+from ..shared_options import Json, output_option
 
 EPILOG = "Example:\n\nflarewright measure report run"
 
@@ -17,7 +17,7 @@ EPILOG = "Example:\n\nflarewright measure report run"
 def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder written by `measure run`.")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="OUT.html", help="The page (default: DIR/report.html).")
+        Path | None, output_option(metavar="OUT.html", help="The page (default: DIR/report.html).")
     ] = None,
     model: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A ghost model (default: DIR/compact.json or DIR/model.json).")

@@ -11,7 +11,7 @@ import typer
 from ...errors import FlarewrightError
 from ...workflow.measure_provenance import STAGES as AFTER_MERGING
 from ..common import print_json, print_remark, print_remarks, progress_bar
-from ..shared_options import Json
+from ..shared_options import Json, output_option
 from .stages import By, CorrectionsFile, Every, NoResidual
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ STAGES = ("merge", *AFTER_MERGING)
 Captures = Annotated[
     Path, typer.Argument(metavar="CAPTURES", help="captures.csv, or a folder of photographs with --angles.")
 ]
-Output = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for all results.")]
+Output = Annotated[Path, output_option(metavar="DIR", help="Folder for all results.")]
 Camera = Annotated[
     Path | None,
     typer.Option(

@@ -11,7 +11,7 @@ import typer
 from ...errors import ProjectError
 from ..common import check_free, check_place, field_angles, print_remarks, write_text
 from ..render.tracks import compile_places, pixel_place
-from ..shared_options import Force
+from ..shared_options import Force, output_option
 
 if TYPE_CHECKING:
     from ...model import Light, Project
@@ -24,9 +24,7 @@ EPILOG = (
 
 def init(
     lens: Annotated[str, typer.Argument(metavar="LENS", help="A shipped lens, a lens file, or a measured flare.")],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="The project file, *.toml (default: stdout).")
-    ] = None,
+    output: Annotated[Path | None, output_option(help="The project file, *.toml (default: stdout).")] = None,
     light: Annotated[
         str | None, typer.Option(metavar="X,Y", help="The first light, degrees right and up (default: 10,5).")
     ] = None,

@@ -5,18 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from ..common import check_free, check_place, print_remarks, write_text
-from ..shared_options import Force
+from ..shared_options import Force, output_option
 
 EPILOG = "Example:\n\nflarewright scene init -o match.toml\n\nflarewright predict match.toml -o match.html"
 
 
 def init(
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="The scene file, *.toml (default: stdout).")
-    ] = None,
+    output: Annotated[Path | None, output_option(help="The scene file, *.toml (default: stdout).")] = None,
     force: Force = False,
 ) -> None:
     """Write a scene with two cameras, the sun and a lamp, and a comment on every key."""

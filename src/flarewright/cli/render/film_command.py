@@ -9,7 +9,7 @@ import typer
 
 from ..common import check_free, check_rate, one_bar, print_json, print_remarks
 from ..progress_lines import print_line
-from ..shared_options import Force, Json
+from ..shared_options import Force, Json, output_option
 from .preview import check_look
 
 if TYPE_CHECKING:
@@ -23,9 +23,7 @@ EPILOG = (
 
 def film(
     files: Annotated[str, typer.Argument(metavar="NAME.####.exr", help="Finished frames: EXR, TIFF, PNG or JPEG.")],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILM.mp4|FILM.mov", help="H.264, or ProRes 422 HQ.")
-    ],
+    output: Annotated[Path, output_option(metavar="FILM.mp4|FILM.mov", help="H.264, or ProRes 422 HQ.")],
     frames: Annotated[
         str | None, typer.Option(metavar="A-BxS", help="1001-1240, 1001-1240x2 or 1,5,9-12 (default: all files).")
     ] = None,

@@ -9,7 +9,7 @@ import typer
 
 from ...errors import ProjectError
 from ..common import check_free, check_place, check_rate, print_json, print_remarks, write_text
-from ..shared_options import Force, Json
+from ..shared_options import Force, Json, output_option
 
 EPILOG = (
     "Examples:\n\nflarewright nuke-script 'flare.####.exr' --plate 'plate.####.exr' -o comp.nk\n\n"
@@ -19,7 +19,7 @@ EPILOG = (
 
 def nuke_script(
     flare: Annotated[str, typer.Argument(metavar="FILE.exr|flare.####.exr", help="An EXR of render or shot.")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT.nk|OUT.gizmo", help="The script to write.")],
+    output: Annotated[Path, output_option(metavar="OUT.nk|OUT.gizmo", help="The script to write.")],
     plate: Annotated[
         str | None, typer.Option(metavar="FILE|plate.####.exr", help="Picture to which the flare is added.")
     ] = None,

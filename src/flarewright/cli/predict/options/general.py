@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ...shared_options import Json, Threads
+from ...shared_options import Json, Threads, output_option
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,9 +19,7 @@ class GeneralOptions:
         str,
         typer.Argument(metavar="LENS|MODEL|SCENE", help="A lens, a measured flare (.json), or a scene file (.toml)."),
     ]
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="REPORT.html", help="Write an HTML report.")
-    ] = None
+    output: Annotated[Path | None, output_option(metavar="REPORT.html", help="Write an HTML report.")] = None
     quality: Annotated[
         str | None,
         typer.Option(help="final (traced rays, default) or draft: matrices, fast but dark beyond the field of view."),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from ...shared_options import output_path
 from .layers import LayerOptions, option
 
 
@@ -13,7 +14,7 @@ from .layers import LayerOptions, option
 class FileOption:
     """Where the picture is written."""
 
-    output: Annotated[Path, option("-o", "--output", metavar="OUT.exr", help="The EXR file.")]
+    output: Annotated[Path, option("-o", "--output", parser=output_path, metavar="OUT.exr", help="The EXR file.")]
 
 
 @dataclass(frozen=True, kw_only=True)

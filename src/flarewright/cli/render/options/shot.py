@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ...shared_options import output_name
 from .art import ArtOptions
 from .camera import CameraOptions
 from .layers import LayerOptions
@@ -57,7 +58,14 @@ class ShotFiles:
     """Where the frames are written."""
 
     output: Annotated[
-        str, output_option("-o", "--output", metavar="NAME.####.exr", help="EXR files: ####, %04d or $F4 is the frame.")
+        str,
+        output_option(
+            "-o",
+            "--output",
+            parser=output_name,
+            metavar="NAME.####.exr",
+            help="EXR files: ####, %04d or $F4 is the frame.",
+        ),
     ]
 
 
