@@ -29,7 +29,8 @@ from flarewright.io.files.door import (
 )
 from flarewright.io.files.text_file import read_json, read_toml
 from flarewright.io.files.type_slips import MOST_ERRORS
-from flarewright.io.images.exr import read_exr, read_exr_plane, write_exr
+from flarewright.io.images.exr import read_exr, write_exr
+from flarewright.io.images.foreign_exr import read_exr_plane
 from flarewright.io.images.height_image import read_heights
 from flarewright.io.images.mask_image import read_mask
 from flarewright.io.images.photo import open_photo

@@ -7,7 +7,8 @@ import OpenEXR
 import pytest
 
 from flarewright.errors import FileError, FlarewrightError, OutputError
-from flarewright.io.images.exr import CHROMATICITIES, read_exr, read_exr_layer, read_exr_plane, write_exr
+from flarewright.io.images.exr import CHROMATICITIES, read_exr, write_exr
+from flarewright.io.images.foreign_exr import read_exr_layer, read_exr_plane
 from flarewright.io.images.half import rounded_to_half
 from flarewright.model import Layer
 

@@ -2,7 +2,8 @@
 
 - `contact_sheet`: `write_contact_sheet`, small pictures on one page and in one picture
 - `cryptomatte`: `matte_layers`, `matte_attributes`, `identifier`, a matte of ghosts as a Cryptomatte
-- `exr`: `write_exr` and `read_exr` for layers; `read_exr_plane`, `read_exr_layer` for any EXR file; `exr_note`
+- `exr`: `write_exr` and `read_exr` for layers; `exr_note`
+- `foreign_exr`: `read_exr_plane`, `read_exr_grey`, `read_exr_layer` for EXR files of other programs
 - `exr_attributes`: `shot_attributes`, OpenEXR's standard attributes of a frame
 - `file_space`: `FileSpace`: linear colour spaces beside Rec.709 and ACEScg
 - `half`: `exr_scale`, `rounded_to_half`, scale and rounding of half floats

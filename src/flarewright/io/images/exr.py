@@ -1,6 +1,6 @@
 """OpenEXR files: layers as parts, the project in the metadata.
 
-`write_exr` and `read_exr` are for our own files; `read_exr_plane` and `read_exr_layer` read files of other programs.
+`write_exr` and `read_exr` are for our own files; `foreign_exr` reads pictures that other programs wrote.
 
 Every program opens the first part: the first layer (the beauty) with plain channels R, G, B. Each further layer is a
 separate part, named after the layer, with channels `layer.R`, `layer.G`, `layer.B`; compositing programs list it
@@ -42,7 +42,7 @@ from ...errors import FileError, FlarewrightError, OutputError, raised_as
 from ...model.layer import Layer, part_inside
 from ...model.matte import GhostMatte
 from ...model.project.camera import Colorspace
-from ...typing import Floats, Pixels
+from ...typing import Pixels
 from ..files.atomic_write import write_atomically
 from ..files.door import outside, printable, sentences_for, shown
 from ..files.silence_libraries import silenced
@@ -56,7 +56,7 @@ CHROMATICITIES: Mapping[Colorspace, tuple[float, ...]] = {space: PRIMARIES[name]
 
 _PREFIX = "flarewright."
 _SCALE = f"{_PREFIX}scale"
-_CHANNELS = "RGB"
+CHANNELS = "RGB"
 # beginnings of the names of layers of single ghosts; those of a shot have no dots
 _SINGLE = ("ghost.", "ghost_")
 
@@ -157,19 +157,9 @@ def write_exr(
     FlarewrightError
         When there is no layer, two of the same name, or the scale is no power of two.
     """
-    if Path(path).suffix.lower() != ".exr":
-        raise OutputError(f"the output {fspath(path)!r} must be named *.exr")
-    names = [layer.name for layer in layers]
-    if not names or len(set(names)) != len(names):
-        raise FlarewrightError(f"an EXR file needs at least one layer and no name twice, not {names}")
     if scale is None:
         scale = half_scale() if pixel_type == "half" else 1.0
-    if compression == "dwaa" and pixel_type != "half":
-        raise FlarewrightError("compression dwaa keeps 16 bits of a value: give pixel_type half, or compression zip")
-    if not _is_scale(scale):
-        raise FlarewrightError(f"scale {scale!r} is no power of two from 2^-63 to 2^63; give exr_scale(project)")
-    if "scale" in (metadata or {}):
-        raise FlarewrightError("metadata 'scale' would replace the file's own; choose another name")
+    _check(path, layers, scale, pixel_type, compression, metadata or {})
     parts: list[Any] = []
     full_windows = full_windows or one_part
     for k, layer in enumerate(layers):
@@ -191,12 +181,34 @@ def write_exr(
         parts += _matte_parts(matte, size_px, pixel_aspect)
     if one_part:
         parts = [_joined(parts)]
-    if printable(str(path)) != str(path):
-        raise OutputError(f"cannot write {shown(path)}: its name is not UTF-8; choose another name")
     write_atomically(Path(path), lambda temporary: _write_parts(parts, temporary, path))
     if scale == 1.0:
         return ()
     return (f"the EXR holds irradiances times {scale:.9g}, its attribute {_SCALE}; --float writes them as they are",)
+
+
+def _check(
+    path: str | PathLike[str],
+    layers: Sequence[Layer],
+    scale: float,
+    pixel_type: str,
+    compression: str,
+    metadata: Mapping[str, str],
+) -> None:
+    """Raise an error for arguments of `write_exr` that contradict each other."""
+    if Path(path).suffix.lower() != ".exr":
+        raise OutputError(f"the output {fspath(path)!r} must be named *.exr")
+    if printable(str(path)) != str(path):
+        raise OutputError(f"cannot write {shown(path)}: its name is not UTF-8; choose another name")
+    names = [layer.name for layer in layers]
+    if not names or len(set(names)) != len(names):
+        raise FlarewrightError(f"an EXR file needs at least one layer and no name twice, not {names}")
+    if compression == "dwaa" and pixel_type != "half":
+        raise FlarewrightError("compression dwaa keeps 16 bits of a value: give pixel_type half, or compression zip")
+    if not _is_scale(scale):
+        raise FlarewrightError(f"scale {scale!r} is no power of two from 2^-63 to 2^63; give exr_scale(project)")
+    if "scale" in metadata:
+        raise FlarewrightError("metadata 'scale' would replace the file's own; choose another name")
 
 
 def _part(
@@ -269,7 +281,7 @@ def _write_parts(parts: list[Any], temporary: Path, path: str | PathLike[str]) -
     if shutil.disk_usage(temporary.parent).free < _SPARE:
         # the library ignores errors of the last bytes, which it writes when it closes a file
         try:
-            _open_parts(temporary, "an EXR file")
+            open_parts(temporary, "an EXR file")
         except FileError:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from None
 
@@ -283,7 +295,7 @@ def read_exr(path: str | PathLike[str]) -> ExrContents:
         When it is not a readable EXR file.
     """
     with raised_as(OutputError), sentences_for(path, "an EXR file"):
-        return _contents(_open_parts(path, "an EXR file"))
+        return _contents(open_parts(path, "an EXR file"))
 
 
 def _contents(file: Any) -> ExrContents:
@@ -291,7 +303,7 @@ def _contents(file: Any) -> ExrContents:
     mattes = matte_names(file.parts[0].header)
     # a Cryptomatte's identifiers are no light
     light = [part for k, part in enumerate(file.parts) if k == 0 or not _of_matte(part.name(), mattes)]
-    scales = [_scale(part) for part in light]
+    scales = [scale_of(part) for part in light]
     layers = []
     for k, (part, scale) in enumerate(zip(light, scales, strict=True)):
         groups = [("", part.name() or "beauty")] if k == 0 else [(f"{part.name()}.", part.name())]
@@ -299,12 +311,12 @@ def _contents(file: Any) -> ExrContents:
             # a file that `one_part` wrote
             below = dict.fromkeys(name.rpartition(".")[0] for name in part.channels if "." in name)
             # files of others hold more, such as depth.Z
-            whole = [n for n in below if all(f"{n}.{channel}" in part.channels for channel in _CHANNELS)]
+            whole = [n for n in below if all(f"{n}.{channel}" in part.channels for channel in CHANNELS)]
             groups += [(f"{n}.", n) for n in whole if not _of_matte(n, mattes)]
         x, y = (int(value) for value in part.header["dataWindow"][0])
         about = _prefixed(part.header, f"{_PREFIX}layer.")
         for prefix, name in groups:
-            planes = [part.channels[f"{prefix}{channel}"].pixels for channel in _CHANNELS]
+            planes = [part.channels[f"{prefix}{channel}"].pixels for channel in CHANNELS]
             by = part.header.get(f"{_SCALE}.{name}", scale)
             pixels = _unscaled(np.stack(planes, axis=-1).astype(np.float32, copy=False), by)
             layers.append(
@@ -346,7 +358,7 @@ def _of_matte(layer: str, mattes: Sequence[str]) -> bool:
     return any(layer.startswith(name) and layer.removeprefix(name).isdecimal() for name in mattes)
 
 
-def _open_parts(path: str | PathLike[str], what: str, pixel_bytes: int = 8) -> Any:
+def open_parts(path: str | PathLike[str], what: str, pixel_bytes: int = 8) -> Any:
     """Open a file with all its parts; raises FileError also for damaged parts, which the library silently skips."""
     import OpenEXR
 
@@ -359,139 +371,6 @@ def _open_parts(path: str | PathLike[str], what: str, pixel_bytes: int = 8) -> A
         if len(file.parts) < max(whole, 1):
             raise ValueError("its pixels are damaged or cut short")
     return file
-
-
-def read_exr_plane(path: str | PathLike[str], choices: Sequence[Sequence[str]], what: str = "an EXR file") -> Floats:
-    """Read one plane of any EXR file within its display window.
-
-    Parameters
-    ----------
-    path : path
-    choices : sequence of sequence of str
-        Sets of channels to average; the first set that the file has is used. The name of a single channel is ignored.
-    what : str
-        Expected kind of file, for messages.
-
-    Returns
-    -------
-    ndarray, shape (H, W)
-        0 outside the data window.
-
-    Raises
-    ------
-    FileError
-        When it is not a readable EXR file, or has none of these channels.
-    """
-    with sentences_for(path, what, "give an EXR file"):
-        return _plane(*_part_with(_open_parts(path, what), choices))
-
-
-def read_exr_grey(path: str | PathLike[str], choices: Sequence[Sequence[str]]) -> tuple[Floats, Floats | None]:
-    """Read a grey picture and its alpha, opening the file once.
-
-    Parameters
-    ----------
-    path, choices
-        As of `read_exr_plane`.
-
-    Returns
-    -------
-    grey, alpha : ndarray, shape (H, W)
-        As of `read_exr_plane`; no alpha without a channel A.
-
-    Raises
-    ------
-    FileError
-        As `read_exr_plane`.
-    """
-    with sentences_for(path, "an image", "give an EXR file"):
-        file = _open_parts(path, "an image", 16)
-        grey = _plane(*_part_with(file, choices))
-        part = next((part for part in file.parts if "A" in part.channels), None)
-        return grey, None if part is None else _plane(part, ("A",))
-
-
-def read_exr_layer(
-    path: str | PathLike[str], layer: str | None, what: str = "an EXR file"
-) -> tuple[Pixels, dict[str, Any]]:
-    """Read the colours of a layer of any EXR file within its display window.
-
-    Parameters
-    ----------
-    path : path
-    layer : str or None
-        A part's name, or the beginning of the names of its channels: "diffuse" for diffuse.R, diffuse.G, diffuse.B.
-        None: plain channels R, G and B, or a single channel, or Y (grey).
-    what : str
-        Expected kind of file, for messages.
-
-    Returns
-    -------
-    pixels : ndarray, shape (H, W, 3), float32
-        0 outside the data window; values may be infinite or NaN.
-    header : dict
-        Attributes of the layer's part, over those of the first part.
-
-    Raises
-    ------
-    FileError
-        When it is not a readable EXR file, or has no such layer.
-    """
-    with sentences_for(path, what, "give an EXR file"):
-        file = _open_parts(path, what)
-        part, names = _layer(file, layer, path)
-        values = [np.asarray(part.channels[name].pixels, dtype=np.float64) / _scale(part) for name in names]
-        planes = [_over_display(part, plane) for plane in values]
-        colours = np.stack(planes if len(planes) == 3 else [planes[0]] * 3, axis=-1)
-        with np.errstate(over="ignore"):
-            pixels = colours.astype(np.float32)
-        return pixels, {**file.parts[0].header, **part.header}
-
-
-def _layer(file: Any, layer: str | None, path: str | PathLike[str]) -> tuple[Any, Sequence[str]]:
-    """Return the part and the channels of a layer; of the plain colours if none is named."""
-    if layer is None:
-        return _part_with(file, (("R", "G", "B"), ("Y",)))
-    for prefix in (f"{layer}.", ""):
-        for part in file.parts:
-            names = [f"{prefix}{channel}" for channel in _CHANNELS]
-            if (prefix or part.name() == layer) and all(name in part.channels for name in names):
-                return part, names
-    channels = {name.rpartition(".")[0] for part in file.parts for name in part.channels if name.endswith(".R")}
-    known = sorted(channels | {part.name() for part in file.parts if "R" in part.channels and part.name()})
-    raise FileError(
-        f"{shown(path)} has no layer {layer!r} with R, G and B: its layers are {', '.join(known[:12]) or 'unnamed'}; "
-        "choose one, or omit the name"
-    )
-
-
-def _plane(part: Any, names: Sequence[str]) -> Floats:
-    """Return the mean of channels within the display window."""
-    mean = np.mean([np.asarray(part.channels[name].pixels, float) for name in names], axis=0)
-    return _over_display(part, mean / _scale(part))
-
-
-def _part_with(file: Any, choices: Sequence[Sequence[str]]) -> tuple[Any, Sequence[str]]:
-    """Return the part and the channels of the first set that a file has; a single channel can have any name."""
-    known = [name for part in file.parts for name in part.channels]
-    wanted = [*choices, known] if len(known) == 1 else choices
-    found = [(part, names) for names in wanted for part in file.parts if all(name in part.channels for name in names)]
-    if not found:
-        wanted_names = " or ".join("".join(names) for names in choices)
-        raise ValueError(f"it has no channel {wanted_names}; its channels are {', '.join(known[:8]) or 'none'}")
-    return found[0]
-
-
-def _over_display(part: Any, pixels: Floats) -> Floats:
-    """Return a plane of the data window at the size of the display window, 0 outside."""
-    low, high = part.header["displayWindow"]
-    left, top = (int(a) - int(b) for a, b in zip(part.header["dataWindow"][0], low, strict=True))
-    width, height = (int(b) - int(a) + 1 for a, b in zip(low, high, strict=True))
-    plane = np.zeros((height, width))
-    inside = pixels[max(-top, 0) : max(height - top, 0), max(-left, 0) : max(width - left, 0)]
-    top, left = max(top, 0), max(left, 0)
-    plane[top : top + inside.shape[0], left : left + inside.shape[1]] = inside
-    return plane
 
 
 def exr_size(path: str | PathLike[str]) -> tuple[int, int]:
@@ -520,7 +399,7 @@ def scale_in_exr(path: str | PathLike[str]) -> float:
     import OpenEXR
 
     with raised_as(OutputError), outside(path, "an EXR file", remedy="give an EXR file"):
-        return _scale(OpenEXR.File(str(path), header_only=True).parts[0])
+        return scale_of(OpenEXR.File(str(path), header_only=True).parts[0])
 
 
 def _prefixed(header: Mapping[str, Any], prefix: str) -> dict[str, Any]:
@@ -560,7 +439,7 @@ def _is_scale(scale: float) -> bool:
     return 2.0**-63 <= scale <= 2.0**63 and frexp(scale)[0] == 0.5
 
 
-def _scale(part: Any) -> float:
+def scale_of(part: Any) -> float:
     """Return the scale of a part's values, 1 in files of other programs; raises ValueError when it is invalid."""
     try:
         scale = float(part.header.get(_SCALE, 1.0))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...errors import ProjectError, raised_as
 from ...typing import Floats
 from ..files.door import no_file, outside
-from .exr import read_exr_grey
+from .foreign_exr import read_exr_grey
 
 # finer masks cost time without benefit: edges are antialiased
 LARGEST = 4096

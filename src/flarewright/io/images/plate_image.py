@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...errors import ProjectError, raised_as
 from ...typing import Pixels
 from ..files.door import no_file, outside
-from .exr import read_exr_plane
+from .foreign_exr import read_exr_plane
 from .half import HALF_MAX
 from .mask_image import read_grey
 

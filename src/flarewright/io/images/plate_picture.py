@@ -16,7 +16,8 @@ from ...model.project.backplate import Transfer
 from ...model.project.camera import Colorspace
 from ...typing import Pixels
 from ..files.door import outside, refuse_claim, shown
-from .exr import CHROMATICITIES, read_exr_layer
+from .exr import CHROMATICITIES
+from .foreign_exr import read_exr_layer
 from .half import HALF_MAX
 from .picture import SCREEN
 from .transfer import decoded, white_of
