@@ -18,7 +18,8 @@ from flarewright.render.ghosts.extent_blur import extent_coverage
 from flarewright.render.reference import batches as batch_module
 from flarewright.render.reference import energy_ledger, estimator
 from flarewright.render.reference.estimator import ReferenceRun
-from flarewright.render.render import BLACK, HIDDEN, render
+from flarewright.render.remarks import BLACK, HIDDEN
+from flarewright.render.render import render
 from flarewright.render.scene.opening import make_opening
 from flarewright.render.scene.resolve import resolve_project
 from flarewright.render.scene.shots import make_shots

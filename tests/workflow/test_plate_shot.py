@@ -15,7 +15,7 @@ from flarewright.errors import FlarewrightError
 from flarewright.io.images.exr import read_exr
 from flarewright.model import Holdout, ProjectCurve
 from flarewright.plates.settings import PlateSettings
-from flarewright.render.render import DARK
+from flarewright.render.remarks import DARK
 from flarewright.workflow.plates.plate_files import plate_frames
 from flarewright.workflow.plates.plate_frame import alike_lights
 from flarewright.workflow.plates.plate_sources import plate_shot, sources_file

@@ -5,6 +5,8 @@ Modules at this level join the sub-packages. Each sub-package holds one kind of 
 Modules and sub-packages:
 
 - `render`: `render`, the only renderer; returns a `Rendering`
+- `remarks`: sentences for the user about a finished picture
+- `summary`: `summary_of`: facts of a picture as JSON data
 - `analysis`: `paraxial` and `ghosts`, the analyses that accept any form of lens
 - `gallery`: `cards`, `card_project`, `card_picture`: pictures of the shipped lenses and looks
 - `warmup`: `compile_for_render`, `compile_for_analysis`: compile kernels ahead of time

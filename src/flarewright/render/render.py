@@ -7,8 +7,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import groupby
-from math import isfinite, pi, prod
+from math import isfinite, prod
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -16,12 +15,9 @@ import numpy as np
 
 from ..errors import ProjectError
 from ..io.images.mask_image import read_mask
-from ..kernels.tracing.sequential import REFRACT
-from ..model import Layer, Lens, Project, Stop
+from ..model import Layer, Lens, Project
 from ..model.matte import GhostMatte
-from ..optics.lens.paths import direct_path, ghost_paths
-from ..optics.lens.surface_shape import ideal
-from ..optics.scattering.sensor_grating import grating_orders
+from ..optics.lens.paths import ghost_paths
 from ..typing import Floats, Progress
 from .ghosts.cost import CostMeter, RenderProfile
 from .ghosts.ghost_pass import plain_level, render_ghosts
@@ -29,19 +25,22 @@ from .image.compose import beauty
 from .image.gamut import apply_gamut
 from .image.ghost_ranking import RANK_BYTES, GhostRanking, ghost_matte, rank_remarks
 from .image.shown_layer import ShownLayer, shown_layers
+from .remarks import black_remarks, ghost_veil_remarks, mask_remarks, percent, scene_remarks
 from .scattering.scatter_pass import render_scatter, scatter_facts, scatter_of, without_scattered
 from .scene.arguments import Settings, naming_settings, project_of
 from .scene.art_rules import ResolvedArt, has_overrides, resolve_art, with_gain
-from .scene.direct_image import DirectImage, direct_image, widest_defocus_mm
+from .scene.direct_image import direct_image
 from .scene.memory_check import check_memory, spare_bytes
-from .scene.opening import make_opening, soiled_opening
-from .scene.placement_remarks import outside_remarks, veil_remarks
+from .scene.opening import Opening, make_opening, soiled_opening
+from .scene.placement_remarks import outside_remarks
 from .scene.resolve import ResolvedProject, resolve_project
 from .scene.shot import Shot
 from .scene.shots import make_shots
-from .starburst.starburst_pass import OUT_OF_FOCUS_PX, read_soil, starburst_of
+from .starburst.starburst_pass import read_soil, starburst_of
+from .summary import summary_of
 
 if TYPE_CHECKING:
+    from ..optics.diffraction.fraunhofer import Soil
     from .image.partial_picture import PartialPicture
     from .reference.energy_ledger import Ledger
     from .reference.estimator import ReferenceRun
@@ -51,9 +50,6 @@ PARALLEL_PX = 1_000_000
 """A larger picture's starburst is not computed in parallel with its ghosts: both at once need 100 MB more at 1080p."""
 PIXEL_BYTES = 12
 """Memory of a layer per pixel: three float32."""
-BLACK = "the picture is black: no light comes through the lens to the sensor"
-HIDDEN = "the picture is black: a holdout or a depth plate hides every light"
-DARK = "the picture is black: every light has intensity 0"
 
 
 @dataclass(frozen=True)
@@ -155,19 +151,10 @@ def render(
     # reference quality ignores art direction
     art = ResolvedArt() if project.quality.mode == "reference" else resolved
     opening = make_opening(settled, mask)
-    shots = seen = make_shots(settled, opening)
+    shots = make_shots(settled, opening)
     tables = scatter_of(settled, shots)
     soil = read_soil(project.dirt)
-    if soil is not None and project.dirt.in_ghosts:
-        dirty = soiled_opening(opening, settled.order.stop_semi_diameter, soil)
-        seen = tuple(replace(shot, opening=dirty) for shot in shots)
-    if project.quality.ringing != "off" and project.quality.mode == "final":
-        from .ghosts.diffraction_rings import ringing_for
-
-        rings = ringing_for(
-            project.quality.ringing, seen[0].opening, settled.order.stop_semi_diameter, settled.order.f_number
-        )
-        seen = tuple(replace(shot, ringing=rings) for shot in seen)
+    seen = _through_iris(settled, shots, opening, soil)
     images = [direct_image(settled.lens, shot) for shot in shots]
     stars = images if tables is None else without_scattered(images, tables)
     starburst: Callable[[], Layer] = partial(starburst_of, settled, shots, stars, mask, soil, threads=threads)
@@ -176,7 +163,7 @@ def render(
     else:
         if project.output.starburst and prod(project.camera.size_px) <= PARALLEL_PX:
             starburst = _start_early(starburst, threads)
-        drawn = _ghosts(settled, seen, art, threads, progress, costs, kept, ranking)
+        drawn = _ghosts(settled, seen, art, _Work(threads, progress, costs, kept, ranking))
     passes = list(drawn.passes)
     scattered: dict[str, Any] = {}
     reported: tuple[str, ...] = ()
@@ -198,17 +185,12 @@ def render(
     # the beauty is infinite wherever a pass is
     check_finite((whole, *others))
     matte = None if ranking is None else _matte(ranking, plain, project, art)
-    # line by line: a picture with light ends the search early
-    if not any(line.any() for layer in passes for line in layer.pixels):
-        dark = not any(light.intensity > 0.0 for light in settled.project.lights)
-        hidden = not any(shot.share > 0.0 for shot in shots)
-        reported = (*reported, DARK if dark else HIDDEN if hidden else BLACK)
     account = drawn.ledger
     if ledger and account is None:
         from .reference.energy_ledger import trace_ledger
 
         account = trace_ledger(shots, project.quality.seed, scatter=tables, threads=threads)
-    summary = {**_summary(settled, shots, stars, art), **drawn.facts, **scattered}
+    summary = {**summary_of(settled, shots, stars, art), **drawn.facts, **scattered}
     return Rendering(
         settled.project,
         shown_layers(layers, settled.project),
@@ -217,16 +199,33 @@ def render(
             *settled.remarks,
             *drawn.remarks,
             *reported,
+            *black_remarks(settled, shots, passes),
             *outside_remarks(shots, images),
             *(() if matte is None else rank_remarks(matte)),
-            *_veil_remarks(drawn.passes),
-            *_remarks(settled, seen),
-            *_mask_remarks(mask),
+            *ghost_veil_remarks(drawn.passes),
+            *scene_remarks(settled, seen),
+            *mask_remarks(mask),
         ),
         account if ledger else None,
         None if costs is None else RenderProfile(costs.search_s, costs.costs()),
         matte,
     )
+
+
+def _through_iris(
+    settled: ResolvedProject, shots: tuple[Shot, ...], opening: Opening, soil: Soil | None
+) -> tuple[Shot, ...]:
+    """Return the shots as ghosts see the iris: with its dirt, and with the rings of its edges, as the project asks."""
+    project, semi = settled.project, settled.order.stop_semi_diameter
+    if soil is not None and project.dirt.in_ghosts:
+        opening = soiled_opening(opening, semi, soil)
+        shots = tuple(replace(shot, opening=opening) for shot in shots)
+    if project.quality.ringing == "off" or project.quality.mode != "final":
+        return shots
+    from .ghosts.diffraction_rings import ringing_for
+
+    rings = ringing_for(project.quality.ringing, shots[0].opening, semi, settled.order.f_number)
+    return tuple(replace(shot, ringing=rings) for shot in shots)
 
 
 def _checked(project: Project) -> GhostRanking | None:
@@ -294,27 +293,29 @@ class _Drawn:
     ledger: Ledger | None = None
 
 
-def _percent(share: float) -> str:
-    """Format a part of the light as a percentage."""
-    return f"{100.0 * share:.2g} %" if share >= 1e-6 else "less than 0.0001 %"
+@dataclass(frozen=True)
+class _Work:
+    """How ghosts are drawn, without effect on their light: threads, and what is reported, timed, kept and ranked."""
+
+    threads: int | None
+    progress: Progress | None
+    costs: CostMeter | None
+    kept: PartialPicture | None
+    ranking: GhostRanking | None
 
 
 def _ghosts(
     settled: ResolvedProject,
     shots: tuple[Shot, ...],
     art: ResolvedArt,
-    threads: int | None,
-    progress: Progress | None,
-    costs: CostMeter | None,
-    kept: PartialPicture | None,
-    ranking: GhostRanking | None,
+    work: _Work,
 ) -> _Drawn:
     project = settled.project
     paths = ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None)
     singles = project.output.brightest if project.output.layers == "ghosts" else 0
     ghosts = render_ghosts(
-        shots, paths, project.quality, singles=singles, art=art.paths, threads=threads, progress=progress, costs=costs,
-        kept=kept, ranking=ranking,
+        shots, paths, project.quality, singles=singles, art=art.paths, threads=work.threads, progress=work.progress,
+        costs=work.costs, kept=work.kept, ranking=work.ranking,
     )  # fmt: skip
     facts = {
         "drawn": ghosts.drawn,
@@ -325,21 +326,21 @@ def _ghosts(
     }
     reported = []
     if ghosts.culled:
-        share = _percent(ghosts.culled_share)
+        share = percent(ghosts.culled_share)
         reported.append(f"{ghosts.culled} ghosts that carry {share} of the ghost light were left out")
     if ghosts.faint:
         facts |= {"faint": ghosts.faint, "faint_share": ghosts.faint_share}
         reported.append(
             f"{len(project.lights)} lights: {ghosts.faint} ghosts of single lights were left out, which carry "
-            f"{_percent(ghosts.faint_share)} of the ghost light"
+            f"{percent(ghosts.faint_share)} of the ghost light"
         )
     two = _Drawn((ghosts.total,), ghosts.singles, {"ghosts": facts}, tuple(reported))
     if project.quality.orders == 2:
         return two
     if project.quality.mode == "draft":
         return replace(two, remarks=(*reported, "draft quality has no ghosts of four reflections; final quality has"))
-    plain = plain_level(shots, paths, threads) if art.paths else ghosts.level
-    four = _fours(settled, shots, (plain, ghosts.level), singles, threads, progress, costs, kept, ranking)
+    plain = plain_level(shots, paths, work.threads) if art.paths else ghosts.level
+    four = _fours(settled, shots, (plain, ghosts.level), singles, work)
     return _Drawn(
         two.passes + four.passes, two.others + four.others, {**two.facts, **four.facts}, two.remarks + four.remarks
     )
@@ -350,23 +351,19 @@ def _fours(
     shots: tuple[Shot, ...],
     levels: tuple[float, float],
     singles: int | None,
-    threads: int | None,
-    progress: Progress | None,
-    costs: CostMeter | None,
-    kept: PartialPicture | None,
-    ranking: GhostRanking | None,
+    work: _Work,
 ) -> _Drawn:
     """Draw the four-reflection ghosts above the limit; `levels` of two-reflection ghosts without and with art."""
     from .reference.four_reflections import find_four_reflections
 
     quality = settled.project.quality
     limit = quality.order4_limit
-    found = find_four_reflections(settled.lens, shots, limit, quality.seed, which=quality.paths, threads=threads)
+    found = find_four_reflections(settled.lens, shots, limit, quality.seed, which=quality.paths, threads=work.threads)
     art = resolve_art(settled, found.paths)
     ghosts = render_ghosts(
         shots, found.paths, quality.replace(cull=0.0), singles=singles, art=art.paths, level=levels[1],
-        faintest=limit * levels[0], threads=threads, progress=progress, costs=costs, kept=kept,
-        ranking=ranking,
+        faintest=limit * levels[0], threads=work.threads, progress=work.progress, costs=work.costs, kept=work.kept,
+        ranking=work.ranking,
     )  # fmt: skip
     muted = {name for name, changed in art.paths.items() if not changed.enabled}
     dark, part = found.left_out(muted.union(ghosts.names))
@@ -406,119 +403,3 @@ def _reference(
     if settled.project.quality.paths != "all":
         reported.append(f"reference quality traces every path, not only {settled.project.quality.paths} ones")
     return _Drawn(found.layers, found.variances, {"reference": found.facts}, tuple(reported), found.ledger)
-
-
-def _veil_remarks(passes: Sequence[Layer]) -> list[str]:
-    ghosts = next((layer for layer in passes if layer.name == "ghosts"), None)
-    return [] if ghosts is None else veil_remarks(ghosts)
-
-
-def _remarks(settled: ResolvedProject, shots: tuple[Shot, ...]) -> tuple[str, ...]:
-    reported = []
-    blur_px = widest_defocus_mm(settled.lens, shots) * float(shots[0].to_pixels[2])
-    if settled.project.output.starburst and blur_px > OUT_OF_FOCUS_PX:
-        of = f"the direct image of {'the light' if len(shots) == 1 else 'a light'} is out of focus"
-        spot = "a disc" if shots[0].packed.curvature_x is None else "a spot up to"
-        reported.append(f"{of}: {spot} {blur_px:.1f} pixels wide")
-    if settled.project.quality.mode == "draft" and ideal(settled.lens) != settled.lens:
-        reported.append("draft quality draws the lens as designed, without decentre, tilt and figure errors")
-    quality = settled.project.quality
-    reported += _grating_remarks(settled, shots)
-    if quality.ringing == "frft" and quality.mode != "final":
-        reported.append(f"{quality.mode} quality traces rays alone: quality.ringing is for final quality")
-    rings = shots[0].ringing
-    if rings is not None:
-        # imported only where there are rings
-        from .ghosts.ring_tables import table_obstacle
-
-        if own := table_obstacle(settled.project.lights, image=rings.form is None):
-            reported.append(f"rings in the ghosts of {own} take most of the time: --ringing off leaves them out")
-    return tuple(reported)
-
-
-def _grating_remarks(settled: ResolvedProject, shots: tuple[Shot, ...]) -> list[str]:
-    """Return remarks about orders of a sensor grating that are invisible or left out."""
-    camera, mode = settled.project.camera, settled.project.quality.mode
-    if camera.sensor_grating is None:
-        return []
-    if settled.sensor is None:
-        return ["camera.sensor_grating diffracts what the sensor reflects: nothing without camera.sensor_reflectance"]
-    if mode != "final":
-        return [f"{mode} quality mirrors at the sensor: camera.sensor_grating is for final quality"]
-    last = max(k for k, row in enumerate(settled.lens.rows) if not isinstance(row, Stop))
-    orders = grating_orders(shots[0].packed, last, camera.sensor_grating)
-    drawn = sum(order.efficiency for order in orders)
-    return [f"{len(orders)} orders of the sensor's grating were drawn, which hold {drawn:.1%} of what it reflects"]
-
-
-def _mask_remarks(mask: Floats | None) -> list[str]:
-    """Return a remark about a mask that is not square: it is mapped to the square around the round opening."""
-    if mask is None or mask.shape[0] == mask.shape[1]:
-        return []
-    height, width = mask.shape
-    return [f"the iris image has {width}x{height} pixels and is stretched to the square around the iris; give a square"]
-
-
-def _scene_scale(settled: ResolvedProject, shot: Shot) -> float:
-    """Irradiance at the sensor's centre per radiance of an extended scene: pi T (r / d)^2 of the exit pupil.
-
-    Dividing layers by it gives the unit of the plate (docs/physics.md, "Radiometry"). Focused at infinity, r / d is
-    1 / (2 N); it shrinks as the sensor moves away for a near focus plane.
-    """
-    order = settled.order
-    packed = shot.packed
-    # rays along the axis meet every surface at normal incidence, the last entry of its table
-    path, middle = direct_path(settled.lens), (len(packed.wavelengths_nm) - 1) // 2
-    passed = 1.0 - packed.reflectance[middle, path.rows[path.actions == REFRACT], -1]
-    sensor_z = packed.sensor_z
-    slope = 0.5 / order.f_number
-    if isfinite(order.exit_pupil_z):
-        slope = 0.5 * order.exit_pupil_diameter / abs(sensor_z - order.exit_pupil_z)
-    # a mask spans a square; the round opening is pi / 4 of it
-    opened = shot.opening.mean_transmittance * (1.0 if shot.opening.mask is None else 4.0 / pi)
-    return float(pi * passed.prod() * opened * slope**2)
-
-
-def _summary(
-    settled: ResolvedProject, shots: tuple[Shot, ...], images: list[DirectImage], art: ResolvedArt
-) -> dict[str, Any]:
-    order, project = settled.order, settled.project
-    return {
-        "lens": settled.lens.name,
-        "efl_mm": order.efl,
-        "bfl_mm": order.bfl,
-        **({} if order.efl_x is None else {"efl_x_mm": order.efl_x}),
-        "f_number": order.f_number,
-        "entrance_pupil_diameter_mm": order.entrance_pupil_diameter,
-        "sensor_distance_mm": order.sensor_distance,
-        "size_px": list(project.camera.size_px),
-        "sensor_mm": list(project.camera.sensor),
-        "quality": project.quality.mode,
-        "physical": art.physical,
-        "wavelengths_nm": [float(w) for w in shots[0].packed.wavelengths_nm],
-        "scene_irradiance_per_radiance": _scene_scale(settled, shots[0]),
-        "lights": [
-            _light_summary(project, number, list(of_one))
-            for number, of_one in groupby(zip(shots, images, strict=True), lambda pair: pair[0].number)
-        ],
-    }
-
-
-def _light_summary(project: Project, number: int, parts: list[tuple[Shot, DirectImage]]) -> dict[str, Any]:
-    """Return image position and brightness of a light; for an area light the mean over its parts."""
-    light = project.lights[number]
-    hidden = project.holdout is not None or light.holdout is not None
-    throughput = np.sum([shot.share * image.throughput_mm2 for shot, image in parts], axis=0)
-    weights = np.array([shot.share * float(image.throughput_mm2.sum()) for shot, image in parts])
-    weights = weights / weights.sum() if weights.any() else np.full(len(parts), 1.0 / len(parts))
-    position = weights @ np.array([image.position_mm for _, image in parts])
-    return {
-        "name": light.name,
-        "field_deg": list(light.field_deg),
-        **({} if light.distance is None else {"distance_mm": light.distance}),
-        **({"parts": len(parts)} if light.extended else {}),
-        **({"visible": sum(shot.share for shot, _ in parts)} if hidden else {}),
-        "direct_position_mm": [float(position[0]), float(position[1])],
-        "direct_throughput_mm2": [float(flux) for flux in throughput],
-        "transmittance": float(weights @ [image.transmittance for _, image in parts]),
-    }

@@ -24,7 +24,8 @@ from ..jobs.worker import WRITING
 from ..measure.replay.measured_project import is_measured, render_measured
 from ..model import Layer, Project
 from ..render.image.ocio_space import config_digest, in_file_space
-from ..render.render import BLACK, DARK, Rendering
+from ..render.remarks import BLACK, DARK
+from ..render.render import Rendering
 from ..render.render import render as render_project
 from ..render.scene.resolve import open_lens, resolve_project
 from .frame_files import with_frame_files

@@ -26,7 +26,8 @@ from ...optics.pupil.occlusion import hidden_part
 from ...render.image.compose import beauty
 from ...render.image.gamut import apply_gamut
 from ...render.image.shown_layer import shown_layers
-from ...render.render import BLACK, HIDDEN, PIXEL_BYTES, Rendering, check_finite, render
+from ...render.remarks import BLACK, HIDDEN
+from ...render.render import PIXEL_BYTES, Rendering, check_finite, render
 from ...render.scene.art_rules import with_gain
 from ...render.scene.holdout import read_plates
 from ...render.scene.memory_check import check_memory, spare_bytes
