@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import log
 
@@ -106,83 +106,25 @@ def pursue(
         for view, mask in zip(views, masks, strict=True)
     ]
     wanted = [view.pixels[..., 1] for view in shown] if rest is None else list(rest)
-    left = list(wanted)
-    found: list[DetectedGhost] = []
-    refused: list[_Refused] = []
-    waiting = list(first)
-    steps, how = journal or Journal(), settings.pursuit
+    how = settings.pursuit
     least = max(how.score, how.score_per_view * len(views))
+    search = _Search(shown, masks, wanted, least, iris, factor, pool, tell, journal or Journal(), settings)
     report_progress = _Progress(progress, least)
-    rims: list[RimCandidate] = []
-    small_blobs: list[RimCandidate] = []
-    searched_count = respanned_at = 0
-    at_once = 1
-    crescent_trials: list[RimCandidate] = []
-    crescents_at = -1
-    while len(found) < most:
-        requested = how.trials + len(refused)
-        if requested > searched_count:
-            searched_count = requested + how.reserve
-            rims, small_blobs = steps.step(
-                partial(_candidates, shown, left, masks, searched_count, iris, pool, settings)
-            )
-        trials = _open_candidates(
-            [*rims[:requested], *small_blobs[:requested], *crescent_trials], refused, len(found), least, how
-        )
-        # residuals of ghosts vote for crescents as well: search these late, and again after more ghosts are subtracted
-        enough = len(found) >= how.respan_growth * crescents_at if trials else len(found) > crescents_at
-        if enough and (not trials or trials[0].score < how.crescents_from):
-            crescent_trials = steps.step(partial(_crescents, shown, left, masks, pool, settings))
-            crescents_at = len(found)
-            trials = _open_candidates(
-                [*rims[:requested], *small_blobs[:requested], *crescent_trials], refused, len(found), least, how
-            )
-        report_progress(trials[0].score if trials else least, len(found))
-        trials, waiting = [*waiting[: how.trials_per_vote], *trials], waiting[how.trials_per_vote :]
-        queue, before = trials[: how.trials_per_vote], len(found)
-        while queue:
-            ghosts = steps.step(partial(_fit_candidates, queue[:at_once], shown, left, pool, settings))
-            for trial, ghost in zip(queue[:at_once], ghosts, strict=True):
-                queue = queue[1:]
-                if ghost is None:
-                    refused, at_once = _with_refused(refused, trial, len(found), how), how.concurrent
-                    continue
-                found.append(ghost)
-                crescent_trials = [one for one in crescent_trials if one is not trial]
-                tell(f"ghost {len(found)}: {_described(ghost, trial, factor)}")
-                left = subtract_ghosts(left, [ghost], shown, 1, pool)
-                # candidates tried concurrently were fitted without this ghost: they stay in the queue
-                queue = [
-                    one
-                    for one in queue
-                    if one.score >= how.least_score_ratio * trials[0].score and not _stale(one, trial)
-                ]
-                at_once = 1
-                break
-        if not trials:
+    state, votes, waiting = _State(wanted), _Votes(), list(first)
+    while len(state.found) < most:
+        votes, trials = _vote(search, state, votes)
+        report_progress(trials[0].score if trials else least, len(state.found))
+        queue, waiting = [*waiting[: how.trials_per_vote], *trials], waiting[how.trials_per_vote :]
+        if not queue:
             break
-        if len(found) > before:
-            joint = partial(fit_shapes_jointly, steps=how.joint_steps, pool=pool, settings=settings.fit)
-            shapes = steps.step(partial(joint, found, shown, wanted, 1))
-            found = [replace(ghost, shapes=(one, one, one)) for ghost, one in zip(found, shapes, strict=True)]
-            left = subtract_ghosts(wanted, found, shown, 1, pool)
-            if len(found) >= how.respan_growth * respanned_at:
-                found, (left,) = update_ranges(found, shown, [left], [0] * len(found), pool, settings.fit)
-                respanned_at = len(found)
+        before = len(state.found)
+        state, votes = _try_candidates(search, state, votes, queue[: how.trials_per_vote])
+        if len(state.found) > before:
             # the residual has changed: vote again
-            searched_count = 0
-    if len(found) <= respanned_at:
-        return found
-    return update_ranges(found, shown, [left], [0] * len(found), pool, settings.fit)[0]
-
-
-def _described(ghost: DetectedGhost, trial: RimCandidate, factor: float) -> str:
-    numbers = factor * ghost.shapes[1].numbers
-    rim = "round" if trial.blades is None else f"{trial.blades.count} blades"
-    return (
-        f"speed {numbers[0]:.0f} px, size {abs(numbers[FIRST_G]):.1f} px, {rim}, votes {trial.score:.1f}, views "
-        f"{ghost.first}-{ghost.last}"
-    )
+            state, votes = _fit_together(search, state), replace(votes, searched=0)
+    if len(state.found) <= state.respanned:
+        return state.found
+    return update_ranges(state.found, shown, [state.left], [0] * len(state.found), pool, settings.fit)[0]
 
 
 @dataclass(frozen=True)
@@ -192,6 +134,138 @@ class _Refused:
     candidate: RimCandidate
     times: int
     known: int
+
+
+@dataclass(frozen=True)
+class _Search:
+    """What stays the same during a search: its pictures, the least score, and how it runs and reports."""
+
+    views: Sequence[View]
+    masks: Sequence[Mask]
+    wanted: Sequence[Pixels]
+    least: float
+    iris: Blades | None
+    factor: float
+    pool: ThreadPoolExecutor | None
+    tell: Report
+    steps: Journal
+    settings: DetectionSettings
+
+
+@dataclass(frozen=True)
+class _State:
+    """Progress of a search.
+
+    Attributes
+    ----------
+    left : list of ndarray
+        Residual after the found ghosts.
+    found : list of DetectedGhost
+    refused : list of _Refused
+    respanned : int
+        Number of known ghosts when their ranges were last updated.
+    at_once : int
+        Number of candidates to fit concurrently.
+    """
+
+    left: list[Pixels]
+    found: list[DetectedGhost] = field(default_factory=list)
+    refused: list[_Refused] = field(default_factory=list)
+    respanned: int = 0
+    at_once: int = 1
+
+
+@dataclass(frozen=True)
+class _Votes:
+    """Candidates by their votes in the residual.
+
+    Attributes
+    ----------
+    rims, small_blobs, crescents : list of RimCandidate
+    searched : int
+        Number of rims and of blobs that were requested; 0 when the residual has changed since.
+    crescents_at : int
+        Number of known ghosts when crescents were searched.
+    """
+
+    rims: list[RimCandidate] = field(default_factory=list)
+    small_blobs: list[RimCandidate] = field(default_factory=list)
+    crescents: list[RimCandidate] = field(default_factory=list)
+    searched: int = 0
+    crescents_at: int = -1
+
+
+def _vote(search: _Search, state: _State, votes: _Votes) -> tuple[_Votes, list[RimCandidate]]:
+    """Return the votes, searched again where too few are left, and the candidates to try, best first."""
+    how, known, pool = search.settings.pursuit, len(state.found), search.pool
+    requested = how.trials + len(state.refused)
+
+    def trials_of(votes: _Votes) -> list[RimCandidate]:
+        candidates = [*votes.rims[:requested], *votes.small_blobs[:requested], *votes.crescents]
+        return _open_candidates(candidates, state.refused, known, search.least, how)
+
+    if requested > votes.searched:
+        searched = requested + how.reserve
+        rims, small_blobs = search.steps.step(
+            partial(_candidates, search.views, state.left, search.masks, searched, search.iris, pool, search.settings)
+        )
+        votes = replace(votes, rims=rims, small_blobs=small_blobs, searched=searched)
+    trials = trials_of(votes)
+    # residuals of ghosts vote for crescents as well: search these late, and again after more ghosts are subtracted
+    enough = known >= how.respan_growth * votes.crescents_at if trials else known > votes.crescents_at
+    if enough and (not trials or trials[0].score < how.crescents_from):
+        found = search.steps.step(partial(_crescents, search.views, state.left, search.masks, pool, search.settings))
+        votes = replace(votes, crescents=found, crescents_at=known)
+        trials = trials_of(votes)
+    return votes, trials
+
+
+def _try_candidates(
+    search: _Search, state: _State, votes: _Votes, queue: Sequence[RimCandidate]
+) -> tuple[_State, _Votes]:
+    """Fit candidates one after the other, and subtract each that is a ghost before the next is fitted."""
+    how, best = search.settings.pursuit, queue[0].score
+    while queue:
+        trials = queue[: state.at_once]
+        ghosts = search.steps.step(
+            partial(_fit_candidates, trials, search.views, state.left, search.pool, search.settings)
+        )
+        for trial, ghost in zip(trials, ghosts, strict=True):
+            queue = queue[1:]
+            if ghost is None:
+                refused = _with_refused(state.refused, trial, len(state.found), how)
+                state = replace(state, refused=refused, at_once=how.concurrent)
+                continue
+            left = subtract_ghosts(state.left, [ghost], search.views, 1, search.pool)
+            state = replace(state, found=[*state.found, ghost], left=left, at_once=1)
+            votes = replace(votes, crescents=[one for one in votes.crescents if one is not trial])
+            search.tell(f"ghost {len(state.found)}: {_described(ghost, trial, search.factor)}")
+            # candidates tried concurrently were fitted without this ghost: they stay in the queue
+            queue = [one for one in queue if one.score >= how.least_score_ratio * best and not _stale(one, trial)]
+            break
+    return state, votes
+
+
+def _fit_together(search: _Search, state: _State) -> _State:
+    """Fit the shapes of all found ghosts jointly, and update their ranges when there are many more of them."""
+    how, fit, pool = search.settings.pursuit, search.settings.fit, search.pool
+    joint = partial(fit_shapes_jointly, steps=how.joint_steps, pool=pool, settings=fit)
+    shapes = search.steps.step(partial(joint, state.found, search.views, search.wanted, 1))
+    found = [replace(ghost, shapes=(one, one, one)) for ghost, one in zip(state.found, shapes, strict=True)]
+    left, respanned = subtract_ghosts(search.wanted, found, search.views, 1, pool), state.respanned
+    if len(found) >= how.respan_growth * respanned:
+        found, (left,) = update_ranges(found, search.views, [left], [0] * len(found), pool, fit)
+        respanned = len(found)
+    return replace(state, found=found, left=left, respanned=respanned)
+
+
+def _described(ghost: DetectedGhost, trial: RimCandidate, factor: float) -> str:
+    numbers = factor * ghost.shapes[1].numbers
+    rim = "round" if trial.blades is None else f"{trial.blades.count} blades"
+    return (
+        f"speed {numbers[0]:.0f} px, size {abs(numbers[FIRST_G]):.1f} px, {rim}, votes {trial.score:.1f}, views "
+        f"{ghost.first}-{ghost.last}"
+    )
 
 
 def _with_refused(
