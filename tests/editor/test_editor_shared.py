@@ -10,6 +10,7 @@ from flarewright.editor.commands.registry import done
 from flarewright.editor.preview.display_image import png
 from flarewright.editor.preview.render_picture import pictured
 from flarewright.editor.server.uploads import take_in
+from flarewright.editor.session import known_files
 from flarewright.editor.session import session as session_module
 from flarewright.editor.session.history import before_mask
 from flarewright.editor.session.session import begin
@@ -229,7 +230,7 @@ def test_what_others_save_while_this_is_written_is_not_overwritten(tmp_path, mon
     session.save(str(path))
     assert read_project(path).iris.blades == 9
     # a new file appears, before the last check and right after it
-    for name, module, call, function in (("a", Path, 1, "write_bytes"), ("b", session_module, 2, "stamp_of")):
+    for name, module, call, function in (("a", Path, 1, "write_bytes"), ("b", known_files, 2, "stamp_of")):
         new = tmp_path / f"{name}.toml"
         with monkeypatch.context() as patch:
             after(patch, module, function, call, lambda new=new: new.write_text(theirs))
@@ -250,7 +251,7 @@ def test_what_others_save_right_after_is_theirs(tmp_path, monkeypatch):
     theirs = turned(path)
     session.do("set_iris", {"values": {"blades": 9}})
     with monkeypatch.context() as patch:
-        after(patch, session_module, "save_project", 1, lambda: path.write_text(theirs))
+        after(patch, known_files, "save_project", 1, lambda: path.write_text(theirs))
         session.save(str(path))
     session.do("set_iris", {"values": {"blades": 7}})
     with pytest.raises(ProjectError, match="was changed by another program"):

@@ -5,6 +5,7 @@ Public entry points: `session.begin`, `session.Session`.
 - `session`: `Session` holds history, view and file; `begin` starts or resumes one
 - `history`: `History`, undo and redo
 - `files`: open, import, save and export
+- `known_files`: `KnownFiles`, project files that were opened or saved, and changes by other programs
 - `autosave`: the history on disk, to resume after a crash
 - `autosave_lock`: `AutosaveWriter` writes it on a thread and locks it against other editors
 - `view_settings`: `View`, settings of the screen

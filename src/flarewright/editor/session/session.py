@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ...errors import FlarewrightError, ProjectError
+from ...errors import ProjectError
 from ...io.files.door import expanded
 from ...model import Backplate, Project
 from ...sentences import INVALID
@@ -19,8 +19,9 @@ from ..common.messages import sentence
 from . import history as past
 from .autosave import Saved, autosave_path, read_autosave, set_aside
 from .autosave_lock import AutosaveWriter, claim, claim_last
-from .files import PICTURES, open_any, opened, project_path, sample_project, save_project, stamp_of
+from .files import PICTURES, open_any, opened, project_path, sample_project, stamp_of
 from .input_notes import correction
+from .known_files import KnownFiles
 from .reach import Reach
 from .view_settings import View
 
@@ -51,20 +52,14 @@ class Session:
         # files that the page may name
         self.reach = Reach()
         self.writer = writer
-        # stamps of project files when last opened or saved here, and the stamp of a refused overwrite
-        self._stamps = dict(saved.stamps)
-        if self.file is not None and self.file not in self._stamps:
-            self._stamp(self.file, stamp_of(self.file))
-        self._refused: tuple[Path, str] | None = None
-        # contents of project files, as last read or written here
-        self._contents: dict[str, Project] = {}
+        self._known = KnownFiles(saved.stamps)
         if self.file is not None:
-            self._set_contents(self.file, self.project if saved.clean else _contents_of(self.file, self._stamps))
+            self._known.resume(self.file, self.project if saved.clean else None)
 
     @property
     def clean(self) -> bool:
         """Whether the project file holds the present project."""
-        return self.file is not None and self._contents.get(self.file) == self.project
+        return self._known.holds(self.file, self.project)
 
     @property
     def file(self) -> str | None:
@@ -165,39 +160,10 @@ class Session:
         with self.lock:
             path = project_path(text)
             self.reach.check(path)
-            stamp = self._written(path, self._check_overwrite(path))
+            self._known.save(self.project, path, own=str(path) == self.file)
             self.history = past.filed(self.history, str(path))
-            self._set_contents(str(path), self.project)
-            self._stamp(str(path), stamp)
-            self._refused = None
             self._changed()
             return path
-
-    def _written(self, path: Path, there: str | None) -> str:
-        """Write the project file if its present contents have a given stamp; return the new stamp."""
-        try:
-            # another program may save meanwhile: check again just before the file is replaced
-            return save_project(
-                self.project, path, look=partial(self._check_overwrite, path), replace=there is not None
-            )
-        except FileExistsError:
-            self._check_overwrite(path)
-            raise ProjectError(
-                f"{path.name} is there already and cannot be read, so nothing was written; save under another name"
-            ) from None
-
-    def _check_overwrite(self, place: Path) -> str | None:
-        """Refuse once to overwrite contents of other programs; return the stamp of what may be overwritten."""
-        there, own = stamp_of(place), str(place) == self.file
-        if there is None or self._refused == (place, there) or (own and self._stamps.get(str(place), there) == there):
-            return there
-        self._refused = place, there
-        why = "was changed by another program since it was opened or saved here" if own else "is there already"
-        raise ProjectError(f"{place.name} {why}; save again to overwrite it, or save under another name")
-
-    def _stamp(self, file: str, stamp: str | None) -> None:
-        if stamp is not None:
-            self._stamps[file] = stamp
 
     def open(self, text: str) -> None:
         """Open another project or lens, or a picture as the plate, as a step of the history."""
@@ -214,18 +180,13 @@ class Session:
             self.reach.check_name(text.strip())
             project, file, stamps = _stamped(partial(opened, allowed=self.reach.check_project), text)
             if file is not None:
-                self._set_contents(file, project)
-                self._stamps |= stamps
+                self._known.note(file, project, stamps)
             label = f"Open {Path(text).name}"
             history = past.committed(self.history, project, label, file=file, begins=True)
             if history == self.history:
                 # the project is unchanged, but a picture that it names may exist now
                 self._changed()
             self._move(history)
-
-    def _set_contents(self, file: str, project: Project | None) -> None:
-        if project is not None:
-            self._contents[file] = project
 
     def _move(self, history: past.History) -> None:
         if history is not self.history and history != self.history:
@@ -240,7 +201,7 @@ class Session:
         self.tell({"type": "changed"})
 
     def _autosave(self) -> None:
-        saved = Saved(self.history, self.view, self.file, self.clean, dict(self._stamps))
+        saved = Saved(self.history, self.view, self.file, self.clean, dict(self._known.stamps))
         warning = {"type": "message", "kind": "warning"}
         self.writer.keep(saved, lambda why: self.tell(warning | {"text": f"The autosave failed: {why}"}))
 
@@ -253,14 +214,6 @@ def _on_plate(before: Project, after: Project) -> Project:
     from ...workflow.plates.found_lights import kept_on_plate
 
     return kept_on_plate(before, after)
-
-
-def _contents_of(file: str, stamps: dict[str, str]) -> Project | None:
-    """Return the contents of a project file if it is unchanged since its stamp; else None."""
-    try:
-        return open_any(file)[0] if stamp_of(file) == stamps.get(file) else None
-    except FlarewrightError:
-        return None
 
 
 def _stamped(read: Callable[[str], tuple[Project, str | None]], text: str) -> Opened:
