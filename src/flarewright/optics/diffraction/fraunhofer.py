@@ -20,9 +20,9 @@ from flarewright.model.lens.iris import Iris
 from flarewright.model.project.starburst import Dirt
 
 from ...typing import Floats
-from ..pupil.dirt import Veil, VeilTerm, generate_dirt, scattered, spread_area
+from ..pupil.dirt import Elements, Veil, VeilTerm, generate_dirt, scattered, spread_area
 from ..pupil.iris import blade_edges
-from ..pupil.pupil_function import FFT_SIZE, WINDOW, PupilImage, pupil_amplitude
+from ..pupil.pupil_function import FFT_SIZE, WINDOW, Pupil, PupilImage, pupil_amplitude
 
 CORE_REACH = 60.0
 """Largest s of the core, a third of Nyquist: aliasing is 0.2 % there."""
@@ -203,61 +203,110 @@ def _pattern(
     dirt_image: PupilImage | None,
     turn: float,
 ) -> Pattern:
+    """Return the pattern of `pupil_pattern`, of arguments that a cache can compare."""
     spacing = WINDOW / FFT_SIZE
     reach = math.ceil(CORE_REACH * WINDOW)
     s = np.arange(-reach, reach + 1) / WINDOW
-    trusted = CORE_REACH
     elements = None if dirt is None else generate_dirt(dirt, radius_mm, turn)
     pupil = pupil_amplitude(iris, mask, span, radius_mm, elements, dirt_image, turn)
     P = _power(pupil.amplitude, reach)
-    if mask is None:
-        _undo_softening(P[:, reach:], s, s[reach:], spacing)
-        # for a clean binary pupil, the integral is the root of the centre value; dirt below a sample needs the sum
-        power = math.sqrt(P[reach, reach]) if dirt is None else pupil.light / spacing**2
-        P[:, reach:] /= power * spacing**-2
-    P[:, :reach] = P[::-1, :reach:-1]
-    if mask is None:
-        wings = _wings(iris, turn)
-        if dirt is not None:
-            wings = _scaled_wings(wings, pupil.amplitude_left**2 / pupil.transmittance)
-    else:
-        # The border of an image is soft: pixels are means over their area, then interpolated linearly. Up to an eighth
-        # of a cycle per pixel, division undoes this (isotropic to second order); beyond, the pattern is unknown.
-        finest = min(mask.pixels.shape) / span
-        trusted = min(CORE_REACH, max(8.0, finest / 8.0))
-        # one quadrant contains all radii
-        radius = np.hypot(s[reach:], s[reach:, None])
-        inside = np.minimum(radius, 2.0 * trusted)
-        sharper = 1.0 / (np.sinc(spacing * inside) ** 2 * np.sinc(2.0 * inside / max(finest, 64.0)) ** 6)
-        mirrored = np.abs(np.arange(-reach, reach + 1))
-        P *= sharper[mirrored[:, None], mirrored]
-        wings = _measured_fans(P, s, trusted)
-        flux_outside = 2.0 * math.pi * wings.angular.mean() / trusted
-        total = P[(radius <= trusted)[mirrored[:, None], mirrored]].sum() / WINDOW**2 + flux_outside
-        P /= total
-        wings = FanWings(wings.angular / total)
+    wings: FanWings | BladeWings
     veil: Veil = ()
-    if elements is not None:
-        open_area = math.pi * pupil.transmittance if mask is None else pupil.light
-        if mask is None:  # the measured wings of a mask include dirt already
-            inside = pupil.holds(elements.discs), pupil.holds(elements.arcs)
-            # overlapping pieces scatter less than separate ones
-            alone = spread_area(elements, *inside) / math.pi
-            share = pupil.spread / alone if alone > 0.0 else 1.0
-            veil = tuple(replace(term, radial=share * term.radial) for term in scattered(elements, *inside, open_area))
-        if mask is None and pupil.drawn is not None:
-            veil = (*veil, _drawn_veil(pupil.drawn, s, reach, spacing, open_area))
+    if mask is not None:
+        # its measured wings include those of dirt
+        wings, trusted = _complete_image_core(P, s, spacing, min(mask.pixels.shape) / span)
+    else:
+        _complete_blade_core(P, s, spacing, None if dirt is None else pupil.light)
+        wings, trusted = _wings(iris, turn), CORE_REACH
+        if elements is not None:
+            wings = _scaled_wings(wings, pupil.amplitude_left**2 / pupil.transmittance)
+            veil = _veil_of(elements, pupil, s, spacing)
     P /= WINDOW**2
-    table = np.zeros((len(s) + 1, len(s) + 1))
-    np.cumsum(P, axis=1, out=table[1:, 1:])
-    for row in range(1, len(table)):  # faster than a cumulative sum along the columns
-        table[row] += table[row - 1]
-    table.flags.writeable = False
     rough = 1e-3 * iris.roughness_um / radius_mm
     fans = None
     if rough > 0.0 and isinstance(wings, BladeWings):
         fans = _rough_fans(wings, math.sqrt(2.0) * iris.roughness_um / iris.roughness_length_um)
-    return Pattern(table, WINDOW, trusted, wings, rough, fans, veil, pupil.transmittance)
+    return Pattern(_summed_area(P), WINDOW, trusted, wings, rough, fans, veil, pupil.transmittance)
+
+
+def _complete_blade_core(P: Floats, s: Floats, spacing: float, light: float | None) -> None:
+    """Sharpen and normalize the pattern of blades, and fill its left half, in place.
+
+    Parameters
+    ----------
+    P : ndarray, shape (R, R)
+        From `_power`.
+    s : ndarray, shape (R,)
+        Frequencies of both axes.
+    spacing : float
+        Of the pupil's samples.
+    light : float or None
+        Integral of the pupil's transmittance. None: a clean binary pupil, whose integral is the root of the centre
+        value. (Dirt below a sample needs the sum.)
+    """
+    reach = len(s) // 2
+    _undo_softening(P[:, reach:], s, s[reach:], spacing)
+    power = math.sqrt(P[reach, reach]) if light is None else light / spacing**2
+    P[:, reach:] /= power * spacing**-2
+    P[:, :reach] = P[::-1, :reach:-1]
+
+
+def _complete_image_core(P: Floats, s: Floats, spacing: float, finest: float) -> tuple[FanWings, float]:
+    """Fill the left half of the pattern of a mask image, sharpen and normalize it, in place.
+
+    The border of an image is soft: pixels are means over their area, then interpolated linearly. Up to an eighth of a
+    cycle per pixel, division undoes this (isotropic to second order); beyond, the pattern is unknown.
+
+    Parameters
+    ----------
+    P, s, spacing
+        As of `_complete_blade_core`.
+    finest : float
+        Pixels of the image per radius of the pupil.
+
+    Returns
+    -------
+    wings : FanWings
+    trusted : float
+        Frequency up to which the pattern is known.
+    """
+    reach = len(s) // 2
+    P[:, :reach] = P[::-1, :reach:-1]
+    trusted = min(CORE_REACH, max(8.0, finest / 8.0))
+    # one quadrant contains all radii
+    radius = np.hypot(s[reach:], s[reach:, None])
+    inside = np.minimum(radius, 2.0 * trusted)
+    sharper = 1.0 / (np.sinc(spacing * inside) ** 2 * np.sinc(2.0 * inside / max(finest, 64.0)) ** 6)
+    mirrored = np.abs(np.arange(-reach, reach + 1))
+    P *= sharper[mirrored[:, None], mirrored]
+    wings = _measured_fans(P, s, trusted)
+    flux_outside = 2.0 * math.pi * wings.angular.mean() / trusted
+    total = P[(radius <= trusted)[mirrored[:, None], mirrored]].sum() / WINDOW**2 + flux_outside
+    P /= total
+    return FanWings(wings.angular / total), trusted
+
+
+def _veil_of(elements: Elements, pupil: Pupil, s: Floats, spacing: float) -> Veil:
+    """Return the light that dirt on an iris of blades scatters far from the image."""
+    open_area = math.pi * pupil.transmittance
+    inside = pupil.holds(elements.discs), pupil.holds(elements.arcs)
+    # overlapping pieces scatter less than separate ones
+    alone = spread_area(elements, *inside) / math.pi
+    share = pupil.spread / alone if alone > 0.0 else 1.0
+    veil = tuple(replace(term, radial=share * term.radial) for term in scattered(elements, *inside, open_area))
+    if pupil.drawn is None:
+        return veil
+    return (*veil, _drawn_veil(pupil.drawn, s, len(s) // 2, spacing, open_area))
+
+
+def _summed_area(P: Floats) -> Floats:
+    """Return the sums of a picture over all rectangles from its first corner, read-only."""
+    table = np.zeros((len(P) + 1, len(P) + 1))
+    np.cumsum(P, axis=1, out=table[1:, 1:])
+    for row in range(1, len(table)):  # faster than a cumulative sum along the columns
+        table[row] += table[row - 1]
+    table.flags.writeable = False
+    return table
 
 
 def _rough_fans(wings: BladeWings, slope: float) -> FanWings:
