@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -122,11 +123,7 @@ def add_lenses(
     """
     folder = writable_folder()
     reading = _Reading(apertures, first_column, maker)
-    added: list[LensRecord] = []
-    known: list[tuple[str, str]] = []
-    refused: list[Refused] = []
-    others: dict[str, int] = {}
-    remarks: list[str] = []
+    one_by_one: list[Addition] = []
     kinds: set[str] = set()
     names = _Names(folder)
     if name is not None and len(places) > 1:
@@ -138,39 +135,54 @@ def add_lenses(
                     f"--name gives one lens its name, and {shown(place)} holds {len(found.files)} files; omit it, or "
                     "give one file"
                 )
-            for suffix, number in found.others.items():
-                others[suffix] = others.get(suffix, 0) + number
+            one_by_one.append(Addition(others=dict(found.others)))
             kinds |= {file.suffix for file in found.files}
             for n, file in enumerate(found.files):
                 if progress is not None:
                     progress((k + n / len(found.files)) / len(places), file.stem)
-                try:
-                    data = file.read()
-                    digest = sha256(data).hexdigest()
-                    if (there := names.name_of(digest)) is not None:
-                        known.append((file.label, there))
-                        if name is not None:
-                            remarks.append(f"--name has no effect: {file.label} is in the library, as {there}")
-                        continue
-                    text, record = _read(file, data, digest, reading)
-                    made, said = names.put(text, record, name or file.stem, exact=name is not None)
-                except (OutputError, ProjectError):
-                    raise
-                except FlarewrightError as error:
-                    refused.append(Refused(file.label, str(error)))
-                    continue
-                if made is None:
-                    known.append((file.label, said))
-                else:
-                    added.append(made)
-                    remarks += [said] if said else []
-    for flag, value, suffix in (("apertures", apertures, ".lens"), ("first-column", first_column or "auto", ".seq")):
-        if value != "auto" and suffix not in kinds:
-            remarks.append(f"--{flag} has no effect: there is no {suffix} file")
+                one_by_one.append(_add_file(file, names, reading, name))
+    unused = [
+        f"--{flag} has no effect: there is no {suffix} file"
+        for flag, value, suffix in (("apertures", apertures, ".lens"), ("first-column", first_column or "auto", ".seq"))
+        if value != "auto" and suffix not in kinds
+    ]
     # the index of what was added, so that the first search need not make it
-    library = own_library()
-    damaged = [remark for remark in library.remarks if "index" in remark]
-    return Addition(tuple(added), tuple(known), tuple(refused), dict(sorted(others.items())), (*damaged, *remarks))
+    damaged = [remark for remark in own_library().remarks if "index" in remark]
+    added = _joined(one_by_one)
+    return replace(added, remarks=(*damaged, *added.remarks, *unused))
+
+
+def _joined(additions: Sequence[Addition]) -> Addition:
+    """Return several additions as one."""
+    others: Counter[str] = Counter()
+    for each in additions:
+        others.update(each.others)
+    return Addition(
+        tuple(lens for each in additions for lens in each.added),
+        tuple(file for each in additions for file in each.known),
+        tuple(file for each in additions for file in each.refused),
+        dict(sorted(others.items())),
+        tuple(remark for each in additions for remark in each.remarks),
+    )
+
+
+def _add_file(file: LensFile, names: _Names, reading: _Reading, name: str | None) -> Addition:
+    """Add one file to the library; `name` is that of the lens, or None for the name of the file."""
+    try:
+        data = file.read()
+        digest = sha256(data).hexdigest()
+        if (there := names.name_of(digest)) is not None:
+            remark = f"--name has no effect: {file.label} is in the library, as {there}"
+            return Addition(known=((file.label, there),), remarks=() if name is None else (remark,))
+        text, record = _read(file, data, digest, reading)
+        made, said = names.put(text, record, name or file.stem, exact=name is not None)
+    except (OutputError, ProjectError):
+        raise
+    except FlarewrightError as error:
+        return Addition(refused=(Refused(file.label, str(error)),))
+    if made is None:
+        return Addition(known=((file.label, said),))
+    return Addition(added=(made,), remarks=(said,) if said else ())
 
 
 @dataclass(frozen=True)
