@@ -82,56 +82,71 @@ def scene_data(
     glare : sequence of VeilingGlare or None
         By camera.
     """
-    cameras, lights = plan.scene.cameras, plan.scene.lights
-    rendered = {(one.ranked.camera, one.ranked.light): one for one in worst}
     data: dict[str, Any] = {
         "scene": plan.scene.name,
         "times_s": plan.times_s.tolist(),
         "dates": None if plan.dates is None else [date.isoformat() for date in plan.dates],
-        "ranking": [
-            {
-                "camera": cameras[one.camera].name,
-                "light": lights[one.light].name,
-                "known_share": one.known_share,
-                "mean_veil_cd_m2": one.mean_veil_cd_m2,
-                "worst_at_s": None if one.worst is None else float(plan.times_s[one.worst]),
-                "worst_veil_cd_m2": one.worst_veil_cd_m2,
-                "worst_constellation_deg": one.worst_constellation_deg,
-                "contrast_left": one.contrast_left,
-                "seen_share": one.seen_share,
-                "brightest_stops_from_clipping": one.brightest_stops,
-                **_rendered(rendered.get((one.camera, one.light))),
-            }
-            for one in ranked
-        ],
-        "cameras": [_camera(plan, c, glare[c] if c < len(glare) else None) for c in range(len(cameras))],
-        "which_camera_when": [
-            {
-                "camera": cameras[shot.camera].name,
-                "from_s": float(plan.times_s[shot.first]),
-                "to_s": float(plan.times_s[shot.until]),
-                "from": time_words(plan, shot.first),
-                "to": time_words(plan, shot.until),
-                "unknown_share": unknown_share(plan, shot),
-            }
-            for shot in shots
-        ],
+        "ranking": _ranking(plan, ranked, worst),
+        "cameras": [_camera(plan, c, glare[c] if c < len(glare) else None) for c in range(len(plan.scene.cameras))],
+        "which_camera_when": _shots(plan, shots),
         "remarks": list(plan.remarks),
     }
     if found is not None:
-        data["better_position"] = {
-            "camera": cameras[found.camera].name,
-            "radius_m": found.radius_m,
-            "height_m": found.height_m,
-            "better": found.better,
-            "offset_m": found.offsets_m[found.best].tolist() if found.better else [0.0, 0.0, 0.0],
-            "mean_veil_cd_m2": float(found.veils_cd_m2[0]),
-            "best_mean_veil_cd_m2": float(found.veils_cd_m2[found.best]),
-            "positions": found.offsets_m.tolist(),
-            "veils_cd_m2": [float(veil) if np.isfinite(veil) else None for veil in found.veils_cd_m2],
-            "words": found_words(plan, found),
-        }
+        data["better_position"] = _better_position(plan, found)
     return data
+
+
+def _ranking(plan: Plan, ranked: Sequence[Ranked], worst: Sequence[Worst]) -> list[dict[str, Any]]:
+    """Return the pairs of camera and light, the worst first."""
+    cameras, lights = plan.scene.cameras, plan.scene.lights
+    rendered = {(one.ranked.camera, one.ranked.light): one for one in worst}
+    return [
+        {
+            "camera": cameras[one.camera].name,
+            "light": lights[one.light].name,
+            "known_share": one.known_share,
+            "mean_veil_cd_m2": one.mean_veil_cd_m2,
+            "worst_at_s": None if one.worst is None else float(plan.times_s[one.worst]),
+            "worst_veil_cd_m2": one.worst_veil_cd_m2,
+            "worst_constellation_deg": one.worst_constellation_deg,
+            "contrast_left": one.contrast_left,
+            "seen_share": one.seen_share,
+            "brightest_stops_from_clipping": one.brightest_stops,
+            **_rendered(rendered.get((one.camera, one.light))),
+        }
+        for one in ranked
+    ]
+
+
+def _shots(plan: Plan, shots: Sequence[Shot]) -> list[dict[str, Any]]:
+    """Return the order of cameras over time."""
+    return [
+        {
+            "camera": plan.scene.cameras[shot.camera].name,
+            "from_s": float(plan.times_s[shot.first]),
+            "to_s": float(plan.times_s[shot.until]),
+            "from": time_words(plan, shot.first),
+            "to": time_words(plan, shot.until),
+            "unknown_share": unknown_share(plan, shot),
+        }
+        for shot in shots
+    ]
+
+
+def _better_position(plan: Plan, found: BestPosition) -> dict[str, Any]:
+    """Return the result of a search for a better position."""
+    return {
+        "camera": plan.scene.cameras[found.camera].name,
+        "radius_m": found.radius_m,
+        "height_m": found.height_m,
+        "better": found.better,
+        "offset_m": found.offsets_m[found.best].tolist() if found.better else [0.0, 0.0, 0.0],
+        "mean_veil_cd_m2": float(found.veils_cd_m2[0]),
+        "best_mean_veil_cd_m2": float(found.veils_cd_m2[found.best]),
+        "positions": found.offsets_m.tolist(),
+        "veils_cd_m2": [float(veil) if np.isfinite(veil) else None for veil in found.veils_cd_m2],
+        "words": found_words(plan, found),
+    }
 
 
 def _rendered(worst: Worst | None) -> dict[str, Any]:
