@@ -185,11 +185,7 @@ def lights_at(
     for k in np.flatnonzero(there & seen):
         rgb = light[k] * omega[k] * factor * plate.gain
         if np.isfinite(named[k]):
-            assert plate.known is not None
-            assert plate.white is not None
-            # white paper that faces an illuminance E has the luminance E / pi
-            irradiance = pi * plate.white * plate.known.illuminance_lx / SUN_LUX
-            rgb = rgb / (rgb @ LUMINANCE) * irradiance * named[k] * factor * plate.gain
+            rgb = rgb / (rgb @ LUMINANCE) * _known_irradiance(plate) * named[k] * factor * plate.gain
         intensity = float(rgb @ LUMINANCE)
         if not intensity > 0.0:
             continue
@@ -198,15 +194,12 @@ def lights_at(
         field = np.degrees(np.arctan(slopes[k]))
         shape, diameter = None, 0.0
         if plate.extended[k] and plate.round[k]:
-            xx, _, yy = moments[k]
-            # a disc of radius r has the moments r^2 / 4; its area is that of the pixels
-            diameter = 4.0 * degrees((0.5 * (xx + yy) * omega[k]) ** 0.5)
+            diameter = _disc_deg(moments[k], omega[k])
         elif plate.extended[k]:
             # pixels of the plate to degrees, along the field angles X and Y
             per_px = np.degrees(change[k] / (1.0 + slopes[k][:, None] ** 2)) * scale
             shape = _rectangle(per_px, moments[k])
-        reach = np.abs(field).max() + 0.5 * (diameter if shape is None else float(np.hypot(*shape.size_deg)))
-        if reach > _FARTHEST_DEG or degrees(np.arctan(np.hypot(*slopes[k]))) + 0.5 * diameter > _FARTHEST_DEG:
+        if _reaches_too_far(slopes[k], diameter, shape):
             shape, diameter = None, 0.0
         found.append(
             Light(
@@ -221,6 +214,28 @@ def lights_at(
         )
     lost = float((light[there & ~seen] @ LUMINANCE).sum()) / total if total > 0.0 else 0.0
     return tuple(found) or (Light(name="plate", field_deg=(0.0, 0.0), intensity=0.0),), lost
+
+
+def _known_irradiance(plate: PlateTracks) -> float:
+    """Return the irradiance of a source of known brightness, in units of the plate."""
+    assert plate.known is not None
+    assert plate.white is not None
+    # white paper that faces an illuminance E has the luminance E / pi
+    return pi * plate.white * plate.known.illuminance_lx / SUN_LUX
+
+
+def _disc_deg(moments: Floats, omega: float) -> float:
+    """Return the diameter of a disc with some moments, pixels of the solid angle omega: they are r^2 / 4."""
+    xx, _, yy = moments
+    return float(4.0 * degrees((0.5 * (xx + yy) * omega) ** 0.5))
+
+
+def _reaches_too_far(slopes: Floats, diameter: float, shape: Rectangle | None) -> bool:
+    """Return whether a corner of an area light lies so far from the axis that it is beside the camera."""
+    radius = 0.5 * (diameter if shape is None else float(np.hypot(*shape.size_deg)))
+    if np.abs(np.degrees(np.arctan(slopes))).max() + radius > _FARTHEST_DEG:
+        return True
+    return degrees(np.arctan(np.hypot(*slopes))) + 0.5 * diameter > _FARTHEST_DEG
 
 
 def _between(plate: PlateTracks, frame: float) -> tuple[Floats, Floats, Floats, Floats]:

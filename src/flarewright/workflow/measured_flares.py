@@ -195,19 +195,13 @@ def model_flare(
     around = counting.around(model)
     drawn: GhostModel = model.replace(halo=None, star=None, sprites=()) if counting.ghosts_only else model
     left_out, counts = _what_counts(model, around, counting)
-    if not (drawn.ghosts or drawn.halo or drawn.star or drawn.sprites):
-        counts = "there is nothing in the model: it has no ghosts, halo, star or sprites"
-        if drawn != model:
-            counts = "nothing is counted: only ghosts were requested, and the model has none"
-    remarks = [counts]
-    reference = model.reference
-    light_lx, unit = 1.0, "radiance in the captures' unit, with the light that was photographed"
-    per_lux = reference.luminance_cd_m2 is not None and reference.solid_angle_sr is not None
-    if reference.luminance_cd_m2 is not None and reference.solid_angle_sr is not None:
-        light_lx = reference.luminance_cd_m2 * reference.solid_angle_sr
-        unit = "radiance in the captures' unit over the illuminance that the light gives on a plane facing it"
-    else:
+    remarks = [counts if drawn.ghosts or drawn.halo or drawn.star or drawn.sprites else _nothing_counts(drawn, model)]
+    light_lx = _light_lx(model)
+    if light_lx is None:
+        unit = "radiance in the captures' unit, with the light that was photographed"
         remarks.append("the model does not know the light of its captures: values are in its unit, not per lux")
+    else:
+        unit = "radiance in the captures' unit over the illuminance that the light gives on a plane facing it"
     width, height = model.size_px
     size = (width_px, max(1, round(width_px * height / width)))
 
@@ -218,7 +212,7 @@ def model_flare(
             roll_deg=roll_deg,
             size_px=size,
             around=around,
-            gain=1.0 / light_lx,
+            gain=1.0 if light_lx is None else 1.0 / light_lx,
             colors="camera" if model.to_rec709 is None else "rec709",
         )
 
@@ -232,7 +226,7 @@ def model_flare(
         draw=draw,
         size_px=size,
         sensor=Frame(sensor_width_mm, sensor_width_mm * size[1] / size[0]),
-        f_number=reference.f_number if reference.f_number is not None else math.nan,
+        f_number=math.nan if model.reference.f_number is None else model.reference.f_number,
         scene_scale=math.nan if unit_per_cd_m2 is None else unit_per_cd_m2,
         # turning the frame would need light beyond the captures' border, which was not measured
         turns_by_deg=None,
@@ -240,11 +234,24 @@ def model_flare(
         reach_deg=max(math.floor(high * grid) / grid, least),
         dark_beyond=False,
         unit=unit,
-        per_lux=per_lux,
+        per_lux=light_lx is not None,
         fingerprint=fingerprint_of(drawn.model_dump_json(), settings),
         left_out=left_out,
         remarks=tuple(remarks),
     )
+
+
+def _light_lx(model: GhostModel) -> float | None:
+    """Return the illuminance that the photographed light gives on a plane facing it; None if it is unknown."""
+    luminance, solid_angle_sr = model.reference.luminance_cd_m2, model.reference.solid_angle_sr
+    return None if luminance is None or solid_angle_sr is None else luminance * solid_angle_sr
+
+
+def _nothing_counts(drawn: GhostModel, model: GhostModel) -> str:
+    """Return the remark on a model of which nothing is drawn."""
+    if drawn == model:
+        return "there is nothing in the model: it has no ghosts, halo, star or sprites"
+    return "nothing is counted: only ghosts were requested, and the model has none"
 
 
 def _what_counts(model: GhostModel, around: float, counting: Counting) -> tuple[str, str]:

@@ -28,7 +28,7 @@ from ...plates.joining import joined
 from ...plates.lights import PlateTracks, plate_tracks
 from ...plates.measured_plate import measured_pixels
 from ...plates.settings import PlateSettings
-from ...plates.tracking import SourceTrackSettings, follow, steady
+from ...plates.tracking import SourceTrackSettings, Tracks, follow, steady
 from ...typing import Floats
 from .plate_files import is_picture, plate_digest, plate_matte, plate_name, plate_picture
 
@@ -173,23 +173,13 @@ def plate_shot(
     # one picture for all frames is searched once
     searched = _searched(search, frames[:1] if still else frames, kept, processes, report, executor)
     found = [Sources.from_table(searched[frames[0] if still else frame]) for frame in frames]
-    if not any(len(each) for each in found):
-        if kept is not None:
-            # an error leaves no file
-            delete_written(kept)
-        raise ProjectError(
-            f"the plate has no source above {threshold:.3g}; lower --threshold or --stops"
-            + (", or check the matte" if settings.matte else "")
-        )
+    if not any(len(each) for each in found) and kept is not None:
+        # an error leaves no file
+        delete_written(kept)
+    _check_number(found, settings, threshold, still=still)
     dark = [frame for frame, each in zip(frames, found, strict=True) if not len(each)]
     if dark:
         remarks.append(f"no source in frame{'s'[: len(dark) > 1]} {frames_text(dark)[:80]}")
-    # a track has nine values a frame; noise starts new tracks in every frame
-    if 9.0 * sum(map(len, found)) * len(found) > _MOST_VALUES and not still:
-        raise ProjectError(
-            f"the plate has {sum(map(len, found))} sources in {len(found)} frames, too many to follow; raise the "
-            "threshold, or leave small ones out (--least-pixels 4)"
-        )
     # a still needs no memory of what came before
     tracks = follow(
         frames[:1] if still else frames,
@@ -200,15 +190,8 @@ def plate_shot(
     tracks = steady(tracks, threshold, settings.knee_stops, 0 if still else settings.fade)
     limited, joined_sources, groups = joined(tracks, settings.most_lights)
     if joined_sources:
-        share = 1.0 - (limited.light[: len(limited) - groups] @ LUMINANCE).sum() / (tracks.light @ LUMINANCE).sum()
-        remarks.append(
-            f"{joined_sources} of {len(tracks)} sources, with {share:.1%} of the light, are joined to {groups} "
-            f"light{'s'[: groups > 1]} with ghosts only; --most-lights allows more"
-        )
-    if still and settings.fade != PlateSettings.fade:
-        remarks.append("--fade has no effect on a single plate, whose lights do not change")
-    if settings.highlights is not None and first.white is None:
-        remarks.append("--highlights has no effect on a plate of floating-point numbers, which does not clip")
+        remarks.append(_joined_words(tracks, limited, joined_sources, groups))
+    remarks += _unused(settings, first, still=still)
     clips_at = None
     if first.white is not None:
         clips_at = _BELOW_WHITE * (settings.highlights or first.white)
@@ -220,6 +203,41 @@ def plate_shot(
         settings, threshold, first.size_px, first.pixel_aspect, first.fps, lights, tuple(len(each) for each in found),
         (*first.remarks, *remarks), clips_at is not None and bool((tracks.peak >= clips_at).any()),
     )  # fmt: skip
+
+
+def _check_number(found: Sequence[Sources], settings: PlateSettings, threshold: float, *, still: bool) -> None:
+    """Raise an error for a plate without a source, or with too many to follow."""
+    number = sum(map(len, found))
+    if not number:
+        raise ProjectError(
+            f"the plate has no source above {threshold:.3g}; lower --threshold or --stops"
+            + (", or check the matte" if settings.matte else "")
+        )
+    # a track has nine values a frame; noise starts new tracks in every frame
+    if 9.0 * number * len(found) > _MOST_VALUES and not still:
+        raise ProjectError(
+            f"the plate has {number} sources in {len(found)} frames, too many to follow; raise the "
+            "threshold, or leave small ones out (--least-pixels 4)"
+        )
+
+
+def _joined_words(tracks: Tracks, limited: Tracks, joined_sources: int, groups: int) -> str:
+    """Return the remark on sources that are joined to lights of many."""
+    share = 1.0 - (limited.light[: len(limited) - groups] @ LUMINANCE).sum() / (tracks.light @ LUMINANCE).sum()
+    return (
+        f"{joined_sources} of {len(tracks)} sources, with {share:.1%} of the light, are joined to {groups} "
+        f"light{'s'[: groups > 1]} with ghosts only; --most-lights allows more"
+    )
+
+
+def _unused(settings: PlateSettings, first: PlatePicture, *, still: bool) -> list[str]:
+    """Return remarks on settings without effect on this plate."""
+    remarks = []
+    if still and settings.fade != PlateSettings.fade:
+        remarks.append("--fade has no effect on a single plate, whose lights do not change")
+    if settings.highlights is not None and first.white is None:
+        remarks.append("--highlights has no effect on a plate of floating-point numbers, which does not clip")
+    return remarks
 
 
 def _threshold(settings: PlateSettings, frames: Sequence[int], first: PlatePicture) -> tuple[float, list[str]]:
