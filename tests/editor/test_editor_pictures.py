@@ -807,13 +807,13 @@ def test_every_ghost_of_the_picture_has_rays_in_the_cross_section():
     project = plain_lens("canon-28-80")
     for name in ("8-6", "18-10", "27-5"):
         drawn = cross_section_diagram(project, name)
-        assert (name, drawn.reported) == (name, "")
+        assert (name, drawn.remark) == (name, "")
         assert drawn.svg.count('stroke="#c8313b" stroke-width="1.3"') >= 3, name
     near = project.replace(lights=(Light(field_deg=(1.0, 0.5)),))
-    assert cross_section_diagram(near, "sensor-21").reported == ""
+    assert cross_section_diagram(near, "sensor-21").remark == ""
     # a round iris has no corners
-    assert cross_section_diagram(project.replace(iris=Iris(blades=0)), "18-10").reported
-    assert cross_section_diagram(project, "8-6-7-2").reported
+    assert cross_section_diagram(project.replace(iris=Iris(blades=0)), "18-10").remark
+    assert cross_section_diagram(project, "8-6-7-2").remark
 
 
 def test_grey_is_seen_at_the_exposure_of_the_lens(screen_size):

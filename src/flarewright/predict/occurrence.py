@@ -131,7 +131,7 @@ class Occurrence:
 def predict_occurrence(
     flares: Flares,
     wanted: Wanted,
-    reported: Callable[[str], Progress],
+    progress: Callable[[str], Progress],
     memory: Memory | None = None,
     spread: Spread | None = None,
 ) -> Occurrence:
@@ -141,7 +141,7 @@ def predict_occurrence(
     ----------
     flares : Flares
     wanted : Wanted
-    reported : callable
+    progress : callable
         Called with the name of a part of the work; returns the progress callback of that part.
     memory : dict, optional
         Pictures drawn before; new ones are added.
@@ -157,16 +157,16 @@ def predict_occurrence(
     table = FlareTable(flares.sampled, flares.frame, drawn=known.setdefault(flares.sampled.fingerprint, {}))
     curves = sample_curves(
         table, to_deg=wanted.to_deg, roll_deg=wanted.roll_deg, tolerance=wanted.tolerance, most=wanted.samples,
-        progress=reported("curves"), spread=spread,
+        progress=progress("curves"), spread=spread,
     )  # fmt: skip
     check = None
     if flares.judge is not None and wanted.checks > 0:
-        check = check_curves(curves, flares.judge, wanted.checks, reported("checks"), known, spread)
+        check = check_curves(curves, flares.judge, wanted.checks, progress("checks"), known, spread)
     pictures: list[tuple[float, Pixels]] = []
     if wanted.pictures:
         angles = _worth_a_look(curves)
         requests = [in_colour(flares.shown, known, angle, wanted.roll_deg) for angle in angles]
-        pictures = list(zip(angles, draw_all(requests, spread, reported("pictures")), strict=True))
+        pictures = list(zip(angles, draw_all(requests, spread, progress("pictures")), strict=True))
     return Occurrence(
         flares.sampled, flares.frame, flares.quality, curves, wanted.bins, check, None, wanted.setting, tuple(pictures)
     )

@@ -204,7 +204,7 @@ def rounded_diameter(sighting: CameraSighting) -> float:
 def plan_scene(
     scene: Scene,
     maker: FlareMaker,
-    reported: Callable[[str], Progress],
+    progress: Callable[[str], Progress],
     memory: Memory | None = None,
     spread: Spread | None = None,
 ) -> Plan:
@@ -216,7 +216,7 @@ def plan_scene(
     maker : callable
         Maps (camera, light, diameter_deg, distance_m) to a flare for tables and the camera's frame; a distance of None
         is infinite.
-    reported : callable
+    progress : callable
         Called with the name of a part of the work; returns the progress callback of that part.
     memory : dict, optional
         Pictures drawn before, by the flares' fingerprints; new ones are added.
@@ -239,7 +239,7 @@ def plan_scene(
     draw_all(
         [request for table, sighting in pairs_of for request in requests_of(table, sighting)],
         spread,
-        reported("flares"),
+        progress("flares"),
     )
     pairs, remarks = [], []
     for c, (camera, row) in enumerate(zip(scene.cameras, seen, strict=True)):
@@ -289,21 +289,21 @@ def _measured(table: FlareTable, sighting: CameraSighting) -> Pair:
 
 
 def _pair_remarks(camera: SceneCamera, light: SceneLight, flare: Flare, pair: Pair) -> list[str]:
-    reported = []
+    remarks = []
     unknown = float(np.mean(~pair.known))
     if unknown > 0.0:
-        reported.append(
+        remarks.append(
             f"{camera.name} was measured from {flare.least_deg:g} to {flare.reach_deg:g} degrees; {light.name} stands "
             f"elsewhere in {unknown:.0%} of the times, in which its flare is not known"
         )
     drawn = rounded_distance(pair.sighting, flare.efl)
     lit = pair.sighting.distance_m[pair.sighting.illuminance_lx > 0.0]
     if drawn is not None and float(lit.max() / lit.min()) > STAYS:
-        reported.append(
+        remarks.append(
             f"{light.name} moves between {lit.min():.3g} m and {lit.max():.3g} m from {camera.name}: its ghosts are "
             f"drawn for a distance of {drawn:.3g} m, only its brightness follows"
         )
-    return reported
+    return remarks
 
 
 def ranking(plan: Plan) -> list[Ranked]:

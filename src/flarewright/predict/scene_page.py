@@ -55,14 +55,14 @@ def scene_page(
 
 def _ranking(plan: Plan, ranked: Sequence[Ranked]) -> dict[str, Any]:
     scene = plan.scene
-    reported = scene.luminance_cd_m2 is not None
+    with_contrast = scene.luminance_cd_m2 is not None
     moving = len(plan.times_s) > 1
     head = ["camera", "light", "mean veil, cd/m²" if moving else "veil, cd/m²"]
     head += ["worst, cd/m²", "at"] if moving else []
     head += ["degrees off axis"]
     doubted = any(one.known_share < 1.0 for one in ranked)
-    head += ["remaining contrast"] if reported else []
-    head += ["time under 90 %"] if reported and moving else []
+    head += ["remaining contrast"] if with_contrast else []
+    head += ["time under 90 %"] if with_contrast and moving else []
     head += ["brightest spot, stops from clipping"]
     head += ["known in"] if doubted else []
     rows = []
@@ -74,8 +74,8 @@ def _ranking(plan: Plan, ranked: Sequence[Ranked]) -> dict[str, Any]:
             row += [_cell(one.mean_veil_cd_m2, number)]
             row += [_cell(one.worst_veil_cd_m2, number), time_words(plan, one.worst)] if moving else []
             row += [_cell(one.worst_constellation_deg, "{:.1f}".format)]
-            row += [_cell(one.contrast_left, "{:.1%}".format)] if reported else []
-            row += [_cell(one.seen_share, "{:.0%}".format)] if reported and moving else []
+            row += [_cell(one.contrast_left, "{:.1%}".format)] if with_contrast else []
+            row += [_cell(one.seen_share, "{:.0%}".format)] if with_contrast and moving else []
             row += [_cell(one.brightest_stops, "{:+.1f}".format)]
             row += [f"{one.known_share:.0%} of the times"] if doubted else []
         rows.append(row)

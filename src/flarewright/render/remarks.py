@@ -42,26 +42,26 @@ def ghost_veil_remarks(passes: Sequence[Layer]) -> list[str]:
 
 def scene_remarks(settled: ResolvedProject, shots: tuple[Shot, ...]) -> tuple[str, ...]:
     """Return remarks about defocus, settings that the quality ignores, and expensive rings."""
-    reported = []
+    remarks = []
     blur_px = widest_defocus_mm(settled.lens, shots) * float(shots[0].to_pixels[2])
     if settled.project.output.starburst and blur_px > OUT_OF_FOCUS_PX:
         of = f"the direct image of {'the light' if len(shots) == 1 else 'a light'} is out of focus"
         spot = "a disc" if shots[0].packed.curvature_x is None else "a spot up to"
-        reported.append(f"{of}: {spot} {blur_px:.1f} pixels wide")
+        remarks.append(f"{of}: {spot} {blur_px:.1f} pixels wide")
     if settled.project.quality.mode == "draft" and ideal(settled.lens) != settled.lens:
-        reported.append("draft quality draws the lens as designed, without decentre, tilt and figure errors")
+        remarks.append("draft quality draws the lens as designed, without decentre, tilt and figure errors")
     quality = settled.project.quality
-    reported += _grating_remarks(settled, shots)
+    remarks += _grating_remarks(settled, shots)
     if quality.ringing == "frft" and quality.mode != "final":
-        reported.append(f"{quality.mode} quality traces rays alone: quality.ringing is for final quality")
+        remarks.append(f"{quality.mode} quality traces rays alone: quality.ringing is for final quality")
     rings = shots[0].ringing
     if rings is not None:
         # imported only where there are rings
         from .ghosts.ring_tables import table_obstacle
 
         if own := table_obstacle(settled.project.lights, image=rings.form is None):
-            reported.append(f"rings in the ghosts of {own} take most of the time: --ringing off leaves them out")
-    return tuple(reported)
+            remarks.append(f"rings in the ghosts of {own} take most of the time: --ringing off leaves them out")
+    return tuple(remarks)
 
 
 def _grating_remarks(settled: ResolvedProject, shots: tuple[Shot, ...]) -> list[str]:

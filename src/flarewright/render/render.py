@@ -166,11 +166,11 @@ def render(
         drawn = _ghosts(settled, seen, art, _Work(threads, progress, costs, kept, ranking))
     passes = list(drawn.passes)
     scattered: dict[str, Any] = {}
-    reported: tuple[str, ...] = ()
+    scatter_remarks: tuple[str, ...] = ()
     if tables is not None:
         if project.quality.mode != "reference":
             passes.append(render_scatter(settled, shots, images, tables, threads=threads))
-        facts, reported = scatter_facts(settled, tables)
+        facts, scatter_remarks = scatter_facts(settled, tables)
         scattered = {"scatter": facts}
     if project.output.starburst:
         passes.insert(0, starburst())
@@ -198,7 +198,7 @@ def render(
         (
             *settled.remarks,
             *drawn.remarks,
-            *reported,
+            *scatter_remarks,
             *black_remarks(settled, shots, passes),
             *outside_remarks(shots, images),
             *(() if matte is None else rank_remarks(matte)),
@@ -324,21 +324,21 @@ def _ghosts(
         "culled_share": ghosts.culled_share,
         "muted": ghosts.muted,
     }
-    reported = []
+    remarks = []
     if ghosts.culled:
         share = percent(ghosts.culled_share)
-        reported.append(f"{ghosts.culled} ghosts that carry {share} of the ghost light were left out")
+        remarks.append(f"{ghosts.culled} ghosts that carry {share} of the ghost light were left out")
     if ghosts.faint:
         facts |= {"faint": ghosts.faint, "faint_share": ghosts.faint_share}
-        reported.append(
+        remarks.append(
             f"{len(project.lights)} lights: {ghosts.faint} ghosts of single lights were left out, which carry "
             f"{percent(ghosts.faint_share)} of the ghost light"
         )
-    two = _Drawn((ghosts.total,), ghosts.singles, {"ghosts": facts}, tuple(reported))
+    two = _Drawn((ghosts.total,), ghosts.singles, {"ghosts": facts}, tuple(remarks))
     if project.quality.orders == 2:
         return two
     if project.quality.mode == "draft":
-        return replace(two, remarks=(*reported, "draft quality has no ghosts of four reflections; final quality has"))
+        return replace(two, remarks=(*remarks, "draft quality has no ghosts of four reflections; final quality has"))
     plain = plain_level(shots, paths, work.threads) if art.paths else ghosts.level
     four = _fours(settled, shots, (plain, ghosts.level), singles, work)
     return _Drawn(
@@ -374,14 +374,14 @@ def _fours(
         "left_out_share": part,
         "share_of_two_reflections": found.share,
     }
-    reported = [
+    remarks = [
         f"{ghosts.drawn} ghosts of four reflections were drawn; {dark} fainter ones were left out, which carry "
         f"{part:.1%} of that light, {part * found.share:.2%} of the two-reflection light"
     ]
     if found.short:
-        reported.append(f"--order4-limit {limit:g} is so low that some ghosts above it may have been missed")
+        remarks.append(f"--order4-limit {limit:g} is so low that some ghosts above it may have been missed")
     return _Drawn(
-        (replace(ghosts.total, name="ghosts.order4"),), ghosts.singles, {"ghosts.order4": facts}, tuple(reported)
+        (replace(ghosts.total, name="ghosts.order4"),), ghosts.singles, {"ghosts.order4": facts}, tuple(remarks)
     )
 
 
@@ -395,11 +395,11 @@ def _reference(
     from .reference.estimator import ReferenceRun, render_reference
 
     found = render_reference(settled, mask, run or ReferenceRun(), threads=threads, progress=progress)
-    reported = list(found.remarks)
+    remarks = list(found.remarks)
     if settled.project.output.layers == "ghosts":
-        reported.append("reference quality has no layer for each ghost; final quality has")
+        remarks.append("reference quality has no layer for each ghost; final quality has")
     if has_overrides(settled.project):
-        reported.append("reference quality shows the physics: art direction and offsets by chance are left out")
+        remarks.append("reference quality shows the physics: art direction and offsets by chance are left out")
     if settled.project.quality.paths != "all":
-        reported.append(f"reference quality traces every path, not only {settled.project.quality.paths} ones")
-    return _Drawn(found.layers, found.variances, {"reference": found.facts}, tuple(reported), found.ledger)
+        remarks.append(f"reference quality traces every path, not only {settled.project.quality.paths} ones")
+    return _Drawn(found.layers, found.variances, {"reference": found.facts}, tuple(remarks), found.ledger)

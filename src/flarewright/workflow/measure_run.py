@@ -283,7 +283,7 @@ def _find_given(job: _Job) -> dict[str, object]:
 
 def _find(job: _Job, steps: Journal) -> None:
     found = find_stage.find_ghosts(
-        job.folder, job.run, every=job.every, corrections=job.corrections, threads=job.threads, tell=job.report,
+        job.folder, job.run, every=job.every, corrections=job.corrections, threads=job.threads, report=job.report,
         progress=job.progress, journal=steps, settings=job.settings,
     )  # fmt: skip
     job.files.write(FOUND, found)
@@ -303,7 +303,7 @@ def _fit(job: _Job, steps: Journal) -> None:
     way = joint if job.by == "joint" else partial(fit_as_walch, settings=job.walch)
     model = way(
         job.folder, job.run, job.files.read(FOUND), every=job.every, rest=job.whole, threads=job.threads,
-        tell=job.report, progress=job.progress, journal=steps,
+        report=job.report, progress=job.progress, journal=steps,
     )  # fmt: skip
     job.files.write(MODEL, model)
 
@@ -340,7 +340,7 @@ def _track_given(job: _Job, *parts: str) -> dict[str, object]:
 
 def _track(job: _Job, steps: Journal) -> None:
     tracks = track_stage.track_ghosts(
-        job.folder, job.run, job.files.read(MODEL), every=job.every, threads=job.threads, tell=job.progress,
+        job.folder, job.run, job.files.read(MODEL), every=job.every, threads=job.threads, progress=job.progress,
         journal=steps, settings=job.settings,
     )  # fmt: skip
     job.files.write_tracks(tracks)
@@ -359,7 +359,7 @@ def _compress_given(job: _Job) -> dict[str, object]:
 def _compress(job: _Job, steps: Journal) -> None:
     small = compress_stage.compress_ghosts(
         job.folder, job.run, job.files.read(MODEL), job.tracks(), every=job.every, rest=job.whole,
-        threads=job.threads, tell=job.progress, journal=steps, settings=job.settings,
+        threads=job.threads, progress=job.progress, journal=steps, settings=job.settings,
     )  # fmt: skip
     job.files.write(COMPACT, small)
 

@@ -69,16 +69,16 @@ def model_in_scene(camera: SceneCamera, light: SceneLight, width_px: int) -> tup
     name, reference = Path(camera.model or "").name, model.reference
     width_mm = _sensor_width(camera, model)
     flare = model_flare(model, name, width_mm, camera.unit_per_cd_m2, width_px, _counting(camera))
-    reported: list[str] = []
+    own_remarks: list[str] = []
     if camera.f_number is not None and reference.f_number not in (None, camera.f_number):
-        reported.append(
+        own_remarks.append(
             f"measured at f/{reference.f_number:g}: at f/{camera.f_number:g} flare and scene change together, but "
             "ghosts of another opening differ"
         )
     if light.spectrum != type(light).model_fields["spectrum"].default:
-        reported.append(f"measured in its captures' light: the spectrum of {light.name} makes no difference")
+        own_remarks.append(f"measured in its captures' light: the spectrum of {light.name} makes no difference")
     signal, doubt = _over_clipping(model, camera)
-    remarks = (*flare.remarks, *reported, *doubt)
+    remarks = (*flare.remarks, *own_remarks, *doubt)
     recipe = partial(_made_again, camera, light, width_px)
     return replace(flare, over_clipping=signal, remarks=remarks, recipe=recipe), flare.sensor
 
@@ -103,8 +103,8 @@ def _know_light(camera: SceneCamera, model: GhostModel) -> None:
 
 def _sensor_width(camera: SceneCamera, model: GhostModel) -> float:
     # a camera without a given sensor has the default of a lens
-    reported = camera.sensor_mm if "sensor_mm" in camera.model_fields_set else None
-    return sensor_width(model, reported, lambda width, height: f"sensor_mm = [{width:g}, {height:g}]")
+    sensor_mm = camera.sensor_mm if "sensor_mm" in camera.model_fields_set else None
+    return sensor_width(model, sensor_mm, lambda width, height: f"sensor_mm = [{width:g}, {height:g}]")
 
 
 def _model(camera: SceneCamera) -> GhostModel:

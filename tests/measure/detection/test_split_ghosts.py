@@ -64,7 +64,7 @@ def test_a_ghost_that_covers_two_is_split(side):
     shown, one = covering(side)
     assert nearest(small, [one], shown) < 0.5
     reported: list[str] = []
-    two = split_ghosts([one], shown, factor=2.0, tell=reported.append)
+    two = split_ghosts([one], shown, factor=2.0, report=reported.append)
     assert len(two) == 2
     # reported in pixels of pictures twice as wide
     assert reported == [f"split the ghost of speed {2.0 * one.shapes[1].numbers[0]:.0f} px into two"]

@@ -108,7 +108,7 @@ def test_a_core_and_its_body_become_one_ghost():
     pieces = solve_intensities([found(body), found(core)], shown, needed=0.0)
     assert len(pieces) == 2
     reported: list[str] = []
-    one = join_ghosts(pieces, shown, factor=2.0, tell=reported.append)
+    one = join_ghosts(pieces, shown, factor=2.0, report=reported.append)
     assert len(one) == 1
     # reported in pixels of pictures twice as wide
     assert reported == ["joined the ghost of speed -98 px with the one of size 58 px"]

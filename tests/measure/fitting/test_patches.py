@@ -53,7 +53,7 @@ def test_residuals_equal_those_of_numpy(patches, offset, error, tails):
             mean = (flat * jacobian).sum(axis=0)
             matrix -= np.outer(mean, mean) / weight.sum()
         wanted = (weight * residual**2).sum(), weight.sum(), np.count_nonzero(weight)
-        np.testing.assert_allclose(miss.reported[k], wanted, rtol=1e-10)
+        np.testing.assert_allclose(miss.sums[k], wanted, rtol=1e-10)
         np.testing.assert_allclose(sides[k], jacobian.T @ (weight * residual).ravel(), rtol=1e-8, atol=1e-6)
         np.testing.assert_allclose(matrices[k], matrix, rtol=1e-8, atol=1e-8 * np.abs(matrix).max())
     assert miss.cost == pytest.approx(miss.costs.sum())
@@ -66,7 +66,7 @@ def test_threads_change_nothing(patches):
     with ThreadPoolExecutor(3) as pool:
         shared = residual_in(GHOST, whole, error=0.03, pool=pool)
         both = equations(GHOST, FREE, whole, shared, pool=pool)
-    np.testing.assert_array_equal(shared.reported, alone.reported)
+    np.testing.assert_array_equal(shared.sums, alone.sums)
     np.testing.assert_array_equal(shared.residual, alone.residual)
     for one, other in zip(both, equations(GHOST, FREE, whole, alone), strict=True):
         np.testing.assert_array_equal(one, other)

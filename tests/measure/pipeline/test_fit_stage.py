@@ -89,7 +89,7 @@ def test_a_search_in_halved_pictures_reports_of_the_captures_pixels(tmp_path, mo
     settings = MeasureSettings(detection=DetectionSettings(width_px=SIZE[0] // 2))
     pursued = searches(monkeypatch)
     reported: list[str] = []
-    found = find_ghosts(tmp_path, run, most=1, tell=reported.append, settings=settings)
+    found = find_ghosts(tmp_path, run, most=1, report=reported.append, settings=settings)
     assert [view.size_px for view in pursued[0]] == [(SIZE[0] // 2, SIZE[1] // 2)] * len(SMALL_ANGLES)
     speed, size = (float(re.search(f"^ghost 1: .*{word} (-?[0-9.]+) px", reported[0])[1]) for word in ("speed", "size"))
     # as planted, and as stored in the file
@@ -113,7 +113,7 @@ def test_a_fit_joins_what_was_found_in_pieces(tmp_path):
         ghosts=to_model(pieces, views((), angles=SMALL_ANGLES, size=size)),
     )  # fmt: skip
     reported = []
-    model = fit_ghosts(tmp_path, run, rough, settings=PLAIN, most=2, rest=False, tell=reported.append)
+    model = fit_ghosts(tmp_path, run, rough, settings=PLAIN, most=2, rest=False, report=reported.append)
     assert len(model.ghosts) == 1
     assert any("joined the ghost of speed" in line for line in reported)
 

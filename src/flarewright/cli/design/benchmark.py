@@ -244,10 +244,10 @@ def _print(trial: Trial, runs: Sequence[Run]) -> None:
     from rich.table import Table
 
     from ...design.thesis.benchmark import BenchmarkRun
-    from ...design.thesis.figures import comparison, head, side_by_side_charts, solvers_of
+    from ...design.thesis.figures import comparison, head, solvers_of, thesis_words
 
-    reported, several = side_by_side_charts(trial), len(solvers_of(runs)) > 1
-    out = Table(title=f"{trial.title}{' · ' if reported else ''}{reported}")
+    thesis, several = thesis_words(trial), len(solvers_of(runs)) > 1
+    out = Table(title=f"{trial.title}{' · ' if thesis else ''}{thesis}")
     unit = "searches" if solvers_of(runs) in (("pools",), ("ours",)) else "evaluations"
     for column in (*(("solver",) if several else ()), "seed", "seconds", "CPU s", unit,
                    *(one.title for one in trial.measures), "black dB",

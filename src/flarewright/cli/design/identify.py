@@ -49,9 +49,9 @@ def identify(
     structure = structure_of(known)
     vector = vector_of(known, 2.0 * order.stop_semi_diameter, order.sensor_distance)
 
-    def analysed(reported: bool) -> Identification:
+    def analysed(brightness_known: bool) -> Identification:
         return analyse(
-            structure, vector, np.array(slopes), entrance=entrance, brightness=reported, stop_known=stop_known
+            structure, vector, np.array(slopes), entrance=entrance, brightness=brightness_known, stop_known=stop_known
         )
 
     found = analysed(brightness)

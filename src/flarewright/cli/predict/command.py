@@ -142,8 +142,8 @@ def _curves(
     output = options.output
     # pictures are kept until the page is written
     with remembered(options.cache, output, unnamed) as memory:
-        with progress_bar() as reported:
-            found = predict_occurrence(flares, wanted, reported, memory, spread)
+        with progress_bar() as progress:
+            found = predict_occurrence(flares, wanted, progress, memory, spread)
         if glare_of is not None:
             found = replace(found, glare=_glare(glare_of, options.threads))
         print_remarks(dict.fromkeys(found.flare.remarks))

@@ -49,12 +49,12 @@ def predict_and_print(path: Path, options: PredictOptions, unnamed: str) -> None
     near, folder = _nearby(scene, options), Path() if options.output is None else options.output.parent
     # pictures are kept until the page is written
     with remembered(options.cache, options.output, unnamed) as memory:
-        with progress_bar() as reported:
+        with progress_bar() as progress:
             found = predict_scene(
                 scene, file=path, quality=options.quality or "final", near=near,
                 shortest_shot_s=options.shortest_shot or 0.0, pictures=options.output is not None, glare=options.glare,
                 memory=memory, threads=options.threads, processes=options.processes, cluster=options.cluster,
-                folder=folder, prepare=compile_for_render, progress=reported, announce=print_remark,
+                folder=folder, prepare=compile_for_render, progress=progress, announce=print_remark,
             )  # fmt: skip
         print_remarks(found.plan.remarks)
         if options.output is not None:

@@ -30,5 +30,5 @@ def check(file: Annotated[Path, typer.Argument(metavar="FILE", help="A scene fil
         facts = {"cameras": len(scene.cameras), "lights": len(scene.lights), "times": len(times)}
         print_json({"file": str(file), "usable": True, "scene": scene.name, **facts})
         return
-    reported = ((scene.cameras, "camera"), (scene.lights, "light"), (times, "time"))
-    print(f"{file}: usable, {', '.join(count(len(each), noun) for each, noun in reported)}")
+    counted = ((scene.cameras, "camera"), (scene.lights, "light"), (times, "time"))
+    print(f"{file}: usable, {', '.join(count(len(each), noun) for each, noun in counted)}")

@@ -57,10 +57,10 @@ def naming_rules(flags: RenderOptions, project: Project) -> Iterator[None]:
     try:
         yield
     except ProjectError as error:
-        reported = _flag_rules(flags)
-        first = len(project.art.rules) - len(reported)
+        rules = _flag_rules(flags)
+        first = len(project.art.rules) - len(rules)
         # prefix of the names in `render.scene.art_rules`; of the flags only --rule can blur
-        names = {f"art.rules[{first + k}], {rule.select!r}:": words for k, (words, rule) in enumerate(reported)}
+        names = {f"art.rules[{first + k}], {rule.select!r}:": words for k, (words, rule) in enumerate(rules)}
         if first == 0:
             names["art.rules:"] = "--rule"
         for name, words in names.items():
@@ -71,18 +71,18 @@ def naming_rules(flags: RenderOptions, project: Project) -> Iterator[None]:
 
 def _flag_rules(flags: RenderOptions) -> list[tuple[str, Rule]]:
     """Return the rules of flags, each with the text that the user gave."""
-    reported = [(f"--rule {text!r}", _parsed_rule(text)) for text in flags.rule]
+    rules = [(f"--rule {text!r}", _parsed_rule(text)) for text in flags.rule]
     if flags.solo:
-        reported.append(("--solo", Rule(select="all", enable=False)))
-    reported += [(f"--solo {text}", _rule("--solo", text, enable=True)) for text in flags.solo]
-    reported += [(f"--mute {text}", _rule("--mute", text, enable=False)) for text in flags.mute]
-    return reported + _gains(flags.gain)[1]
+        rules.append(("--solo", Rule(select="all", enable=False)))
+    rules += [(f"--solo {text}", _rule("--solo", text, enable=True)) for text in flags.solo]
+    rules += [(f"--mute {text}", _rule("--mute", text, enable=False)) for text in flags.mute]
+    return rules + _gains(flags.gain)[1]
 
 
 def _gains(texts: list[str]) -> tuple[dict[str, float], list[tuple[str, Rule]]]:
     """Return the gains of `--gain`: of passes by name, and of ghosts as rules with their texts."""
     passes: dict[str, float] = {}
-    reported: list[tuple[str, Rule]] = []
+    rules: list[tuple[str, Rule]] = []
     for text in texts:
         name, _, number = (part.strip() for part in text.rpartition("="))
         try:
@@ -102,8 +102,8 @@ def _gains(texts: list[str]) -> tuple[dict[str, float], list[tuple[str, Rule]]]:
                 f"--gain: there is no pass {name!r}; known are {', '.join(PASSES)}; ghosts are named like 7-3 or row:7"
             )
         else:
-            reported.append((f"--gain {text}", _rule("--gain", name, gain=factor)))
-    return passes, reported
+            rules.append((f"--gain {text}", _rule("--gain", name, gain=factor)))
+    return passes, rules
 
 
 def _parsed_rule(text: str) -> Rule:

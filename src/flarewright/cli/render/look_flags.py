@@ -84,5 +84,5 @@ def settings_of(flags: RenderOptions) -> frozenset[str]:
 
 def photographed(project: Project, given: frozenset[str]) -> tuple[Project, list[str]]:
     """Apply photographic defaults to open settings; return the project and a remark on them."""
-    found, reported = as_photographed(project, given)
-    return found, [f"as photographed: {', '.join(reported)}; --ideal omits this"] if reported else []
+    found, chosen = as_photographed(project, given)
+    return found, [f"as photographed: {', '.join(chosen)}; --ideal omits this"] if chosen else []

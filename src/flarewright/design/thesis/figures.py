@@ -89,12 +89,12 @@ def comparison(trial: Trial, runs: Sequence[Run]) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for solver in solvers_of(runs):
         mine = [run for run in runs if run.solver == solver]
-        reported = [solver, str(len(mine)), mine[0].saw]
-        reported += [_median(mine, key) for key in ("seconds", "cpu_seconds", "searches")]
+        row = [solver, str(len(mine)), mine[0].saw]
+        row += [_median(mine, key) for key in ("seconds", "cpu_seconds", "searches")]
         for one in trial.measures:
             values = [float(getattr(run, one.key)) for run in mine]
-            reported += [_median(mine, one.key), number(min(values) if one.best == "min" else max(values))]
-        rows.append(tuple(reported))
+            row += [_median(mine, one.key), number(min(values) if one.best == "min" else max(values))]
+        rows.append(tuple(row))
     return rows
 
 
@@ -160,7 +160,7 @@ def figure_data(trial: Trial, runs: Sequence[Run]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def side_by_side_charts(trial: Trial) -> str:
+def thesis_words(trial: Trial) -> str:
     """Return the thesis' result in words; empty if it has no such test."""
     if trial.thesis is None:
         return ""
@@ -185,10 +185,10 @@ def write_figures(trial: Trial, runs: Sequence[Run], pictures: Sequence[tuple[st
     str
         HTML.
     """
-    reported = side_by_side_charts(trial)
+    thesis = thesis_words(trial)
     titles, keys = zip(*((one.title, one.key) for one in trial.measures), strict=True)
     return html_page(
-        "benchmark", title=f"Solvers compared: {trial.title}", trial=trial, thesis=reported[:1].upper() + reported[1:],
+        "benchmark", title=f"Solvers compared: {trial.title}", trial=trial, thesis=thesis[:1].upper() + thesis[1:],
         about=figures_shown(trial, solvers_of(runs)), head=head(trial), rows=comparison(trial, runs), runs=runs,
         fitness=_fitness_charts(trial, runs),
         seeds=tuple(_seeds_chart(trial, runs, one) for one in trial.measures if not one.along),

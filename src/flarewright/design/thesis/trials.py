@@ -183,13 +183,13 @@ def figures_shown(trial: Trial, solvers: tuple[str, ...]) -> tuple[str, str]:
         degrees. Several sizes with one large population beside islands are 6.17 and 6.18, which compare these, and
         processors.
     """
-    reported = trial.figures
+    figures = trial.figures
     parts = [solver.partition(":") for solver in solvers]
     if trial.films is not None or len(parts) < 2 or len({name for name, _, _ in parts}) > 1:
-        return reported
+        return figures
     if (trial.name, trial.angle_deg) == ("heliar", 13.40):
-        return "6.5", reported[1]
+        return "6.5", figures[1]
     single = any(size.startswith("1x") for _, _, size in parts) and any(not size.startswith("1x") for *_, size in parts)
     if single and trial.name != "scratch":
-        return "6.17" if trial.name == "heliar" else "6.18", reported[1]
-    return reported
+        return "6.17" if trial.name == "heliar" else "6.18", figures[1]
+    return figures

@@ -427,8 +427,8 @@ def prescription(project: Project) -> Prescription:
         coats = resolve_coatings(lens, project.coating)
     except FlarewrightError:
         coats = tuple(None for _ in lens.rows)
-    reported = notes(lens, facts.get("sensor_distance"))
-    rows = tuple(_row(k, row, coats[k], reported.get(k, {})) for k, row in enumerate(lens.rows))
+    row_notes = notes(lens, facts.get("sensor_distance"))
+    rows = tuple(_row(k, row, coats[k], row_notes.get(k, {})) for k, row in enumerate(lens.rows))
     return Prescription(rows, facts, problem, distortion)
 
 
@@ -460,9 +460,9 @@ def distortion_of(heights: Sequence[float] | Floats, ideals: Floats) -> tuple[fl
     return tuple(out)
 
 
-def _row(k: int, row: Row, coat: Any, reported: dict[str, str]) -> dict[str, Any]:
+def _row(k: int, row: Row, coat: Any, row_notes: dict[str, str]) -> dict[str, Any]:
     if isinstance(row, Stop):
-        return {"row": k, "stop": True, "thickness": _text(row.thickness), "notes": reported}
+        return {"row": k, "stop": True, "thickness": _text(row.thickness), "notes": row_notes}
     medium = row.medium
     return {
         "row": k,
@@ -480,7 +480,7 @@ def _row(k: int, row: Row, coat: Any, reported: dict[str, str]) -> dict[str, Any
         "semi_diameter": "" if row.semi_diameter is None else _text(row.semi_diameter),
         "estimated": row.semi_diameter_estimated,
         "coating": "" if coat is None else format_coating(coat),
-        "notes": reported,
+        "notes": row_notes,
     }
 
 

@@ -30,7 +30,7 @@ def notes(lens: Lens, sensor_distance: float | None = None) -> dict[int, dict[st
     dict of int to dict
         Row to column to sentence.
     """
-    reported: dict[int, dict[str, str]] = {}
+    sentences: dict[int, dict[str, str]] = {}
     for k, row in enumerate(lens.rows):
         here: dict[str, str] = {}
         if isinstance(row, Surface):
@@ -40,8 +40,8 @@ def notes(lens: Lens, sensor_distance: float | None = None) -> dict[int, dict[st
         if k == len(lens.rows) - 1:
             _image(row.thickness, sensor_distance, here)
         if here:
-            reported[k] = here
-    return reported
+            sentences[k] = here
+    return sentences
 
 
 def _image(thickness: float, sensor_distance: float | None, here: dict[str, str]) -> None:

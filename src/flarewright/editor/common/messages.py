@@ -25,15 +25,15 @@ _REPORTED = re.compile(r"([\w.\[\]]+)( should be |: )(.*)", re.DOTALL)
 def sentence(error: Exception) -> str:
     """Return one sentence for an error that rejected an edit."""
     if isinstance(error, INVALID):
-        return "; ".join(_said(reported) for reported in validation_sentences(error))
+        return "; ".join(_said(message) for message in validation_sentences(error))
     return " ".join(str(error).split())
 
 
-def _said(reported: str) -> str:
+def _said(message: str) -> str:
     """Reword a validation message such as "dust_per_mm2 should be greater than or equal to 0"."""
-    found = _REPORTED.fullmatch(reported)
+    found = _REPORTED.fullmatch(message)
     if found is None:
-        return reported
+        return message
     field, joint, what = spoken(_INDEX.sub("", found[1])), found[2].replace("should", "must"), found[3]
     for code, bound in BOUNDS.items():
         what = what.replace(code, bound)

@@ -268,7 +268,7 @@ class Solver:
         drop(file)
         over = until(seconds - state.seconds, stop.is_set)
         found = self._found(project, finished, state, CANDIDATES, name, over)
-        reported = (
+        outcome = (
             f"{count(len(found), 'lens', 'lenses')} of {state.searches} tries"
             if found
             else "No lens was found; search longer"
@@ -276,8 +276,8 @@ class Solver:
         proven = obstacles(problem, project)
         if proven:
             why = " ".join(f"{one.target}: {one.reason}" for one in proven)
-            reported = f"No lens can do that: {named(why, project.design)} ({reported})"
-        self._end(project, reported, state.seconds, found)
+            outcome = f"No lens can do that: {named(why, project.design)} ({outcome})"
+        self._end(project, outcome, state.seconds, found)
 
     def _keep(self, file: Path, state: PoolState) -> None:
         try:
@@ -303,28 +303,28 @@ class Solver:
 
     def _report(self, running: bool, words: str, seconds: float, found: tuple[FoundLens, ...]) -> SearchState:
         with self._report_lock:
-            reported = self.progress = SearchState(running, words, seconds, found, self.progress.number + 1)
+            state = self.progress = SearchState(running, words, seconds, found, self.progress.number + 1)
         self.session.tell({"type": "solve"})
-        return reported
+        return state
 
     def _end(self, project: Project, words: str, seconds: float, found: tuple[FoundLens, ...]) -> None:
         """Report the results, then redraw them with traced rays: matrices can flatter a fast lens."""
-        reported = self._report(False, words, seconds, found)
+        state = self._report(False, words, seconds, found)
         if found:
-            self._tracing.submit(partial(self._trace, project, reported))
+            self._tracing.submit(partial(self._trace, project, state))
 
     def _present_project(self, project: Project) -> Project:
         """Return the present project, as the light may have moved; if its lens differs, the searched project."""
         now = self.session.project
         return now if now.lens == project.lens else project
 
-    def _trace(self, project: Project, reported: SearchState, check: Check) -> None:
+    def _trace(self, project: Project, state: SearchState, check: Check) -> None:
         shot, display = self._present_project(project), self.display()
-        traced = tuple(_drawn(one, shot, display, "soon", check) for one in reported.found)
+        traced = tuple(_drawn(one, shot, display, "soon", check) for one in state.found)
         with self._report_lock:
-            if self.progress is not reported:
+            if self.progress is not state:
                 return
-            self.progress = replace(reported, found=traced, number=reported.number + 1)
+            self.progress = replace(state, found=traced, number=state.number + 1)
         self.session.tell({"type": "solve"})
 
 
@@ -379,17 +379,17 @@ def changed(before: Project, after: Project) -> str:
         return f"The coatings were accepted; lens, f-number and zoom are unchanged.{back}"
     settled = resolve_project(after)
     old, new = resolve_project(before).order, settled.order
-    reported = [f"“{settled.opened.lens.name}” was accepted"]
+    parts = [f"“{settled.opened.lens.name}” was accepted"]
     if f"{new.f_number:.3g}" != f"{old.f_number:.3g}":
-        reported.append(
+        parts.append(
             f"its f-number is f/{new.f_number:.3g} instead of f/{old.f_number:.3g}, as its ghosts have the found "
             "sizes at that opening"
         )
     if f"{new.efl:.3g}" != f"{old.efl:.3g}":
-        reported.append(f"its focal length is {new.efl:.3g} mm, not {old.efl:.3g} mm")
+        parts.append(f"its focal length is {new.efl:.3g} mm, not {old.efl:.3g} mm")
     if before.zoom is not None:
-        reported.append(f"it has no zoom position {before.zoom!r}")
-    return f"{'; '.join(reported)}.{back}"
+        parts.append(f"it has no zoom position {before.zoom!r}")
+    return f"{'; '.join(parts)}.{back}"
 
 
 def coloured(problem: ColorProblem, values: Floats) -> str:
@@ -411,17 +411,17 @@ def coloured(problem: ColorProblem, values: Floats) -> str:
         return f"{what}: {how}{farthest}"
 
     counted = problem.weights > 0.0
-    reported = []
+    parts = []
     if (wanted := problem.hue_only & counted).any():
-        reported.append(said("Target colours", wanted, ("met", "nearly met", "not met")))
+        parts.append(said("Target colours", wanted, ("met", "nearly met", "not met")))
     if (others := ~problem.hue_only & counted).any():
-        reported.append(said("the other ghosts", others, ("kept", "nearly kept", "changed")))
-    if any("farthest" in words for words in reported):
-        reported.append(f"{UNSEEN_COLOR:g} is just noticeable side by side")
+        parts.append(said("the other ghosts", others, ("kept", "nearly kept", "changed")))
+    if any("farthest" in words for words in parts):
+        parts.append(f"{UNSEEN_COLOR:g} is just noticeable side by side")
     if problem.kept:
         rows = ", ".join(str(k) for k in problem.kept)
-        reported.append(f"the cemented rows ({rows}) stay bare, as cemented surfaces take no film")
-    return "; ".join(reported)
+        parts.append(f"the cemented rows ({rows}) stay bare, as cemented surfaces take no film")
+    return "; ".join(parts)
 
 
 def judged(one: Outcome, problem: Problem) -> str:
@@ -431,9 +431,9 @@ def judged(one: Outcome, problem: Problem) -> str:
     ghost = target if target.startswith("target ") else f"ghost {target}"
     words = HOW_WELL.get(verdict(one), "not met")
     # an invisible error is rounding
-    reported = words if _worst(one) < UNSEEN_MM else f"{words}, {ghost} is farthest off, by {_worst(one):.3g} mm"
+    how_well = words if _worst(one) < UNSEEN_MM else f"{words}, {ghost} is farthest off, by {_worst(one):.3g} mm"
     gone = ", ".join(name if name.startswith("target ") else f"ghost {name}" for name in one.lost)
-    return f"{reported}; too few rays reach {gone}" if gone else reported
+    return f"{how_well}; too few rays reach {gone}" if gone else how_well
 
 
 def _worst(one: Outcome) -> float:

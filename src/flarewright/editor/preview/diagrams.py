@@ -48,10 +48,10 @@ def mask_png(project: Project) -> bytes:
 
 @dataclass(frozen=True)
 class Section:
-    """A cross-section as SVG; `reported` says why rays of the ghost are missing, if they are."""
+    """A cross-section as SVG; `remark` says why rays of the ghost are missing, if they are."""
 
     svg: str
-    reported: str = ""
+    remark: str = ""
 
 
 def cross_section_diagram(project: Project, ghost: str | None) -> Section:

@@ -31,7 +31,7 @@ COARSE_S = 1.2
 LOADING_FACTOR = 2.0
 # above this time, places of ghosts are measured before the final picture, so that the user can pick them early
 GHOSTS_FIRST_S = 2.5
-# work shorter than PROGRESS_AFTER_S reports no progress; progress is reported every PROGRESS_EVERY_S
+# work shorter than PROGRESS_AFTER_S reports no progress; progress is reported_at every PROGRESS_EVERY_S
 PROGRESS_AFTER_S, PROGRESS_EVERY_S = 0.6, 0.12
 
 
@@ -225,14 +225,14 @@ def _calibrate(screen: Screen, project: Project, check: Check) -> None:
 
 
 def _progress(screen: Screen, what: str, check: Check) -> Any:
-    reported = time.perf_counter() + PROGRESS_AFTER_S - PROGRESS_EVERY_S
+    reported_at = time.perf_counter() + PROGRESS_AFTER_S - PROGRESS_EVERY_S
 
     def step(part: float, _: str) -> None:
-        nonlocal reported
+        nonlocal reported_at
         check()
         now = time.perf_counter()
-        if now - reported > PROGRESS_EVERY_S:
-            reported = now
+        if now - reported_at > PROGRESS_EVERY_S:
+            reported_at = now
             screen.session.tell({"type": "progress", "part": part, "what": what})
 
     return step

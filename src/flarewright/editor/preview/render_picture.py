@@ -182,12 +182,12 @@ def take(
     rest = spread_layers([layer for layer in parts if not layer.name.startswith("ghosts")], size)
     scattered = [layer for layer in parts if not layer.name.startswith(("ghosts", "starburst"))]
     haze = spread_layers(scattered, size) if scattered else None
-    reported = rendering.remarks
+    remarks = rendering.remarks
     if hasty and pointlike(project) is not project:
-        reported = (*reported, POINTS)
+        remarks = (*remarks, POINTS)
     if grade == "final" and _slow_rings(stage.replace(quality=project.quality)):
-        reported = (*reported, NO_RINGS)
-    return DrawnPicture(project, grade, ghosts, rest, time.perf_counter() - started, reported, haze=haze)
+        remarks = (*remarks, NO_RINGS)
+    return DrawnPicture(project, grade, ghosts, rest, time.perf_counter() - started, remarks, haze=haze)
 
 
 def moving_stage(project: Project, scale: float, levels: Levels) -> Project:

@@ -172,7 +172,7 @@ def _ghosts(workspace: Workspace, _request: Request, _body: Any) -> Any:
 
 def _section(workspace: Workspace, request: Request, _body: Any) -> Any:
     drawn = diagrams.cross_section_diagram(workspace.session.project, request.query_params.get("ghost"))
-    return {"svg": drawn.svg, "reported": drawn.reported}
+    return {"svg": drawn.svg, "reported": drawn.remark}
 
 
 def _coating(workspace: Workspace, request: Request, _body: Any) -> Any:
@@ -302,8 +302,8 @@ def _seconds(body: Any) -> float:
 
 
 def _accept(workspace: Workspace, _request: Request, body: Any) -> Any:
-    reported = workspace.solver.accept(int(body["number"]))
-    return workspace.state() | {"reported": reported}
+    words = workspace.solver.accept(int(body["number"]))
+    return workspace.state() | {"reported": words}
 
 
 def _candidate(workspace: Workspace, request: Request, _body: Any) -> Any:

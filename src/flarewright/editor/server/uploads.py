@@ -94,5 +94,5 @@ def _use_mask(session: Session, picture: str) -> tuple[str, ...]:
     if turned:
         values["rotation_deg"] = 0.0
     session.do("set_iris", {"values": values})
-    reported = f"the blades were rotated by {turned:g}°; the image is not rotated: Rotation is now 0°"
-    return (reported,) if turned else ()
+    remark = f"the blades were rotated by {turned:g}°; the image is not rotated: Rotation is now 0°"
+    return (remark,) if turned else ()

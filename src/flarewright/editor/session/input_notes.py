@@ -28,8 +28,8 @@ def correction(name: str, values: dict[str, Any], project: Project) -> str:
     str
         One sentence, or empty.
     """
-    reported = REPORTED.get(name)
-    return "" if reported is None else reported(values, project)
+    describe = REPORTED.get(name)
+    return "" if describe is None else describe(values, project)
 
 
 def _light(values: dict[str, Any], project: Project) -> str:

@@ -235,7 +235,7 @@ def begin(what: str | None) -> tuple[Session, str]:
     Returns
     -------
     session : Session
-    reported : str
+    message : str
         Message for the user; may be empty.
 
     Raises
@@ -258,10 +258,10 @@ def begin(what: str | None) -> tuple[Session, str]:
     if saved is None and what is None and writer.number > 1:
         # a second editor starts with the state of the first
         saved = read_autosave(autosave_path(None))
-    session, reported = _started(saved, given, writer)
+    session, message = _started(saved, given, writer)
     if writer.number > 1:
-        reported = f"Another editor has this open too; this one has a separate autosave. {reported}".strip()
-    return session, f"{lost} {reported}".strip()
+        message = f"Another editor has this open too; this one has a separate autosave. {message}".strip()
+    return session, f"{lost} {message}".strip()
 
 
 def _resume_last() -> tuple[tuple[Session, str] | None, str]:
@@ -279,8 +279,8 @@ def _resume_last() -> tuple[tuple[Session, str] | None, str]:
 
 def _started(saved: Saved | None, given: Opened | None, writer: AutosaveWriter) -> tuple[Session, str]:
     if saved is not None and not saved.clean and (given is None or given[0] != saved.history.present):
-        reported = "The last session was resumed; undo leads back." if len(saved.history.moments) > 1 else ""
-        return Session(saved, writer), reported
+        message = "The last session was resumed; undo leads back." if len(saved.history.moments) > 1 else ""
+        return Session(saved, writer), message
     if given is None and saved is not None and saved.file is not None and Path(saved.file).is_file():
         # other programs may have changed the file since
         project, file, fresh_stamps = _stamped(open_any, saved.file)

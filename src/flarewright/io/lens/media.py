@@ -158,11 +158,11 @@ def remarks(findings: list[tuple[int, Finding]], place: str = "row") -> tuple[st
     for number, finding in findings:
         if finding.kind == "reported":
             same.setdefault(finding.text, []).append(str(number))
-    reported = tuple(f"{place}{'s' * (len(at) > 1)} {', '.join(at)}: {text}" for text, at in same.items())
+    sentences = tuple(f"{place}{'s' * (len(at) > 1)} {', '.join(at)}: {text}" for text, at in same.items())
     nearest = [f"{place} {number} {finding.text}" for number, finding in findings if finding.kind == "nearest"]
     if not nearest:
-        return reported
-    return (*reported, f"dispersion of the nearest catalogue glass: {', '.join(nearest)}")
+        return sentences
+    return (*sentences, f"dispersion of the nearest catalogue glass: {', '.join(nearest)}")
 
 
 def _by_numbers(glass: str | None, n_d: float, v_d: float | None) -> tuple[Medium, Finding]:

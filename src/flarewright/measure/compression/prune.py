@@ -46,7 +46,7 @@ _BATCH = 8
 
 def compact_model(
     model: GhostModel, tracks: Tracks, views: Sequence[View], *, threads: int | None = None,
-    tell: Progress = lambda _part, _words: None, journal: Journal | None = None,
+    progress: Progress = lambda _part, _words: None, journal: Journal | None = None,
     settings: CompressionSettings = CompressionSettings(),
 ) -> GhostModel:  # fmt: skip
     """Compact a fitted model.
@@ -60,7 +60,7 @@ def compact_model(
     views : sequence of View
         In order of rising constellation, with halo and star subtracted.
     threads : int, optional
-    tell : callable
+    progress : callable
         Receives the finished fraction and a text.
     journal : Journal, optional
         Resumes an interrupted run; the result does not depend on it.
@@ -83,14 +83,14 @@ def compact_model(
     kept = [ghost for ghost in model.ghosts if isinstance(ghost, AberrationGhost) and ghost.name in tracked]
     spans = [drawn_range(ghost, tracked[ghost.name]) for ghost in kept]
     found = [_found(ghost, span, views) for ghost, span in zip(kept, spans, strict=True)]
-    tell(0.0, count(len(kept), "ghost"))
+    progress(0.0, count(len(kept), "ghost"))
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         steps = journal or Journal()
         found = _with_fewer_numbers(
-            found, kept, views, pool, steps, lambda part, words: tell(0.7 * part, words), settings
+            found, kept, views, pool, steps, lambda part, words: progress(0.7 * part, words), settings
         )
         curves = curves_of(
-            found, spans, views, pool, steps, lambda part, words: tell(0.7 + 0.3 * part, words), settings
+            found, spans, views, pool, steps, lambda part, words: progress(0.7 + 0.3 * part, words), settings
         )
     ghosts = tuple(
         _model_ghost(ghost, each, span, curve, settings)
@@ -128,7 +128,7 @@ def _found(ghost: AberrationGhost, span: tuple[float, float], views: Sequence[Vi
 
 def _with_fewer_numbers(
     ghosts: Sequence[DetectedGhost], kept: Sequence[AberrationGhost], views: Sequence[View], pool: ThreadPoolExecutor,
-    steps: Journal, tell: Progress, settings: CompressionSettings,
+    steps: Journal, progress: Progress, settings: CompressionSettings,
 ) -> list[DetectedGhost]:  # fmt: skip
     """Drop unneeded parameters and refit the others, each ghost against all others, brightest first."""
     out = list(ghosts)
@@ -141,7 +141,7 @@ def _with_fewer_numbers(
         out[k] = new
         fit = new.fits[1]
         numbers = count(0 if fit is None else fit.free.size, "number")
-        tell((done + 1) / len(out), f"ghost {kept[k].name}: {numbers} a colour")
+        progress((done + 1) / len(out), f"ghost {kept[k].name}: {numbers} a colour")
     return out
 
 
@@ -202,7 +202,7 @@ class _Measurement:
 
 def curves_of(
     ghosts: Sequence[DetectedGhost], spans: Sequence[tuple[float, float]], views: Sequence[View],
-    pool: ThreadPoolExecutor, steps: Journal, tell: Progress, settings: CompressionSettings = CompressionSettings(),
+    pool: ThreadPoolExecutor, steps: Journal, progress: Progress, settings: CompressionSettings = CompressionSettings(),
 ) -> list[Curves]:  # fmt: skip
     """Measure the poses of all ghosts in every frame and fit curves to them.
 
@@ -214,7 +214,7 @@ def curves_of(
     views : sequence of View
     pool : executor
     steps : Journal
-    tell : callable
+    progress : callable
     settings : CompressionSettings
     """
     measurements: list[list[_Measurement]] = [[] for _ in ghosts]
@@ -231,15 +231,15 @@ def curves_of(
     for at in range(0, len(views), _BATCH):
         some = slice(at, at + _BATCH)
         measured += steps.step(partial(done_by, pool, one, views[some], visible[some]))
-        tell(len(measured) / len(views), f"{views[len(measured) - 1].constellation_deg:.1f} degrees")
+        progress(len(measured) / len(views), f"{views[len(measured) - 1].constellation_deg:.1f} degrees")
     for view, there, here in zip(views, visible, measured, strict=True):
         for g, pose, error, inside in zip(there, here.poses, here.error, here.inside, strict=True):
             if inside > 0.0 and isfinite(error[0]):
                 values = (pose.brightness, factor * pose.along_px, pose.size)
                 # a ghost too faint to be seen does not determine shift and size
                 placed = pose.brightness > settings.tracking.there
-                reported = (error[0], factor * error[1] if placed else np.inf, error[2] if placed else np.inf)
-                measurements[g].append(_Measurement(view.constellation_deg, values, reported))
+                errors = (error[0], factor * error[1] if placed else np.inf, error[2] if placed else np.inf)
+                measurements[g].append(_Measurement(view.constellation_deg, values, errors))
     return [_curves(each, ghost, span, settings) for each, ghost, span in zip(measurements, ghosts, spans, strict=True)]
 
 

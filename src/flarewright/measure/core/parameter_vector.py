@@ -73,17 +73,17 @@ def channel_of(numbers: Floats, discs: int, uncertainty: Floats | None = None) -
     ten = [cast(Ten, tuple(map(float, numbers[at : at + FIRST_G]))) for at in (0, FIRST_G, FIRST_I)]
     cuts = numbers[FIRST_DISC:end].reshape(discs, DISC_NUMBERS)
     soft = float(np.sqrt(max(numbers[SOFT], 0.0)))
-    reported = () if uncertainty is None else tuple(map(float, uncertainty[:end]))
+    errors = () if uncertainty is None else tuple(map(float, uncertainty[:end]))
     if uncertainty is not None and uncertainty[SOFT:].any():
         # softness is stored as a variance: propagate its error to the root, and to the error of the root at 0
         most = max(soft, float(np.sqrt(uncertainty[SOFT])), 1e-300)
-        reported += (float(uncertainty[SOFT]) / (2.0 * most),)
+        errors += (float(uncertainty[SOFT]) / (2.0 * most),)
         every = uncertainty[BELOW:].any()
-        reported += tuple(map(float, uncertainty[LATERAL : NUMBERS if every else _lateral_end(uncertainty, LATERAL)]))
+        errors += tuple(map(float, uncertainty[LATERAL : NUMBERS if every else _lateral_end(uncertainty, LATERAL)]))
     return Channel(
         f=ten[0], g=ten[1], intensity=ten[2],
         discs=tuple(Disc(centre=(float(cut[0]), float(cut[1])), radius=float(cut[2])) for cut in cuts),
-        soft_px=soft, uncertainty=reported,
+        soft_px=soft, uncertainty=errors,
         lateral_px=tuple(map(float, numbers[LATERAL : _lateral_end(numbers, LATERAL + _FEW_LATERAL)])),
         below=cast(tuple[float, float], tuple(map(float, numbers[BELOW:]))),
     )  # fmt: skip
@@ -94,11 +94,11 @@ def channel_deviation(channel: Channel) -> Floats:
 
     The entry of softness, whose parameter is a variance, is the standard deviation of `soft_px`.
     """
-    deviation, reported = np.zeros(NUMBERS), np.array(channel.uncertainty)
+    deviation, errors = np.zeros(NUMBERS), np.array(channel.uncertainty)
     # a channel omits absent discs: softness and the later parameters follow its last disc
-    discs = min(FIRST_DISC + DISC_NUMBERS * len(channel.discs), reported.size)
-    deviation[:discs] = reported[:discs]
-    deviation[SOFT : SOFT + reported.size - discs] = reported[discs:]
+    discs = min(FIRST_DISC + DISC_NUMBERS * len(channel.discs), errors.size)
+    deviation[:discs] = errors[:discs]
+    deviation[SOFT : SOFT + errors.size - discs] = errors[discs:]
     return deviation
 
 
@@ -149,12 +149,12 @@ def with_bounded_controls(numbers: Floats) -> Floats:
 
 
 def ten_terms(u: Floats, v: Floats, w: Floats) -> Floats:
-    """Return the ten terms of the ghost polynomials, shape (10, N), in parameter order; see `measure_pupil`."""
+    """Return the ten terms of the ghost polynomials, shape (10, N), in parameter order; see `pupil_mesh`."""
     return np.stack([np.ones_like(u), u, v, w, u * u, u * v, v * v, u * w, v * w, w * w])
 
 
 def denominator(b: float, c: float, v: Floats, w: Floats) -> Floats:
-    """Return the denominator of a ghost's position and size at v and w; see `measure_pupil`."""
+    """Return the denominator of a ghost's position and size at v and w; see `kernels.ghost_model.pupil_mesh`."""
     return np.maximum(1.0 + b * v + c * w, LEAST_BELOW)
 
 

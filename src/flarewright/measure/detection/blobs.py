@@ -24,7 +24,7 @@ _SIDES = 4
 
 
 def blobs(
-    views: Sequence[View], pixels: Sequence[Pixels], masks: Sequence[Mask], *, most: int = 8, channel: int = 1,
+    views: Sequence[View], pixels: Sequence[Pixels], masks: Sequence[Mask], *, most: int = 8,
     pool: ThreadPoolExecutor | None = None, settings: BlobSettings = BlobSettings(),
 ) -> list[RimCandidate]:  # fmt: skip
     """Return the best small candidates, best first, without candidates close to a better one.
@@ -39,8 +39,6 @@ def blobs(
         Pixels to search.
     most : int
         Maximum number of candidates.
-    channel : int
-        Channel of the variance.
     pool : executor, optional
     settings : BlobSettings
     """
@@ -48,7 +46,7 @@ def blobs(
     places = np.arange(-reach, reach + 0.5 * settings.step_px, settings.step_px)
 
     def one(view: View, picture: Pixels, mask: Mask) -> Floats:
-        return _votes(view, np.where(mask, picture, np.nan), view.variance[..., channel], places, settings)
+        return _votes(view, np.where(mask, picture, np.nan), view.variance[..., 1], places, settings)
 
     votes = np.stack(map_batched(one, views, pixels, masks, pool=pool))
     sigmas = np.array([view.sigma for view in views])
@@ -56,11 +54,11 @@ def blobs(
     # shape (views, speeds): index of the position that a blob of each speed would have
     at = np.clip(np.rint((sigmas[:, None] * speeds + reach) / settings.step_px).astype(np.int64), 0, len(places) - 1)
     near = brightest(votes, round(settings.stray_px / settings.step_px), axes=[2])
-    reported = np.take_along_axis(
+    followed = np.take_along_axis(
         near, np.broadcast_to(at[:, None], (len(views), len(settings.radii_px), len(speeds))), axis=2
     )
-    reported[sigmas < settings.least_sigma] = 0.0
-    scores, first, last = _best_runs(reported)
+    followed[sigmas < settings.least_sigma] = 0.0
+    scores, first, last = _best_runs(followed)
     best: list[RimCandidate] = []
     for place in np.argsort(scores, axis=None)[::-1][: settings.trials]:
         r, s = np.unravel_index(place, scores.shape)

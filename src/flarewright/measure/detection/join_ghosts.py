@@ -25,7 +25,7 @@ _NO_ERROR = 1e-9
 
 def join_ghosts(
     ghosts: Sequence[DetectedGhost], views: Sequence[View], *, factor: float = 1.0,
-    pool: ThreadPoolExecutor | None = None, tell: Report = lambda _: None,
+    pool: ThreadPoolExecutor | None = None, report: Report = lambda _: None,
     settings: DetectionSettings = DetectionSettings(),
 ) -> list[DetectedGhost]:  # fmt: skip
     """Join pairs of detected ghosts that are one ghost.
@@ -38,7 +38,7 @@ def join_ghosts(
     factor : float
         Pixels of a capture per pixel of these views; the report is in pixels of the captures.
     pool : executor, optional
-    tell : callable
+    report : callable
         Receives one line per joined pair.
     settings : DetectionSettings
 
@@ -49,8 +49,9 @@ def join_ghosts(
 
     Notes
     -----
-    A lens of revolution maps the pupil by g(u), u the square of the distance from its centre (`measure_pupil`). Small g
-    near the centre makes a bright core; a fit that starts from a uniform disc does not reach it.
+    A lens of revolution maps the pupil by g(u), u the square of the distance from its centre
+    (`kernels.ghost_model.pupil_mesh`). Small g near the centre makes a bright core; a fit that starts from a uniform
+    disc does not reach it.
     Blobs are not joined: a larger ghost cannot draw a caustic of one or two pixels that is many times brighter. The
     residual learns it at subpixel resolution, attached to a separate ghost (`blob_sprites`).
     """
@@ -66,7 +67,7 @@ def join_ghosts(
             out = [each for each in out if each is not ghost and each is not other] + [one]
             rest = residual_of(out, views, 1, pool)
             size, speed = abs(other.shapes[1].numbers[FIRST_G]), ghost.shapes[1].numbers[0]
-            tell(f"joined the ghost of speed {factor * speed:.0f} px with the one of size {factor * size:.0f} px")
+            report(f"joined the ghost of speed {factor * speed:.0f} px with the one of size {factor * size:.0f} px")
             break
     return out
 

@@ -63,7 +63,7 @@ def start_shape(
 def pursue(
     views: Sequence[View], masks: Sequence[Mask], *, most: int = 60, first: Sequence[RimCandidate] = (),
     rest: Sequence[Pixels] | None = None, iris: Blades | None = None, factor: float = 1.0,
-    pool: ThreadPoolExecutor | None = None, tell: Report = lambda _: None,
+    pool: ThreadPoolExecutor | None = None, report: Report = lambda _: None,
     progress: Progress = lambda _part, _words: None, journal: Journal | None = None,
     settings: DetectionSettings = DetectionSettings(),
 ) -> list[DetectedGhost]:  # fmt: skip
@@ -87,7 +87,7 @@ def pursue(
     factor : float
         Pixels of a capture per pixel of these views; the report is in pixels of the captures.
     pool : executor, optional
-    tell : callable
+    report : callable
         Receives one line per ghost.
     progress : callable
         Receives the finished fraction, estimated from the fall of the best score, and a text.
@@ -108,7 +108,7 @@ def pursue(
     wanted = [view.pixels[..., 1] for view in shown] if rest is None else list(rest)
     how = settings.pursuit
     least = max(how.score, how.score_per_view * len(views))
-    search = _Search(shown, masks, wanted, least, iris, factor, pool, tell, journal or Journal(), settings)
+    search = _Search(shown, masks, wanted, least, iris, factor, pool, report, journal or Journal(), settings)
     report_progress = _Progress(progress, least)
     state, votes, waiting = _State(wanted), _Votes(), list(first)
     while len(state.found) < most:
@@ -147,7 +147,7 @@ class _Search:
     iris: Blades | None
     factor: float
     pool: ThreadPoolExecutor | None
-    tell: Report
+    report: Report
     steps: Journal
     settings: DetectionSettings
 
@@ -239,7 +239,7 @@ def _try_candidates(
             left = subtract_ghosts(state.left, [ghost], search.views, 1, search.pool)
             state = replace(state, found=[*state.found, ghost], left=left, at_once=1)
             votes = replace(votes, crescents=[one for one in votes.crescents if one is not trial])
-            search.tell(f"ghost {len(state.found)}: {_described(ghost, trial, search.factor)}")
+            search.report(f"ghost {len(state.found)}: {_described(ghost, trial, search.factor)}")
             # candidates tried concurrently were fitted without this ghost: they stay in the queue
             queue = [one for one in queue if one.score >= how.least_score_ratio * best and not _stale(one, trial)]
             break

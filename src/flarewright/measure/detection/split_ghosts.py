@@ -48,7 +48,7 @@ _NO_ERROR = 1e-6
 
 def split_ghosts(
     ghosts: Sequence[DetectedGhost], views: Sequence[View], *, iris: Blades | None = None, factor: float = 1.0,
-    pool: ThreadPoolExecutor | None = None, tell: Report = lambda _: None, journal: Journal | None = None,
+    pool: ThreadPoolExecutor | None = None, report: Report = lambda _: None, journal: Journal | None = None,
     settings: DetectionSettings = DetectionSettings(),
 ) -> list[DetectedGhost]:  # fmt: skip
     """Split detected ghosts that cover two ghosts each.
@@ -63,7 +63,7 @@ def split_ghosts(
     factor : float
         Pixels of a capture per pixel of these views; the report is in pixels of the captures.
     pool : executor, optional
-    tell : callable
+    report : callable
         Receives one line per split ghost.
     journal : Journal, optional
         Records the expensive steps.
@@ -90,7 +90,7 @@ def split_ghosts(
         exchange(old.shapes[lead], out[k].shapes[lead], old, views, rests[lead], pool)
         lay_over(other.shapes[lead], other, views, rests[lead], -1.0, pool)
         others.append(other)
-        tell(f"split the ghost of speed {factor * old.shapes[1].numbers[0]:.0f} px into two")
+        report(f"split the ghost of speed {factor * old.shapes[1].numbers[0]:.0f} px into two")
     return [*out, *others]
 
 

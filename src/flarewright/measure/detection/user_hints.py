@@ -70,7 +70,7 @@ def candidate(
 
 
 def report_marks(
-    corrections: Corrections, pointed: Sequence[RimCandidate], found: Sequence[DetectedGhost], tell: Report
+    corrections: Corrections, pointed: Sequence[RimCandidate], found: Sequence[DetectedGhost], report: Report
 ) -> None:
     """Report for each ghost that the user marked whether it was found, and its name.
 
@@ -81,20 +81,20 @@ def report_marks(
         Results of `candidate` for `corrections.add`.
     found : sequence of DetectedGhost
         In the same pixels.
-    tell : callable
+    report : callable
         Receives one line per mark.
     """
     speeds = np.array([ghost.shapes[1].numbers[0] for ghost in found])
     for asked, one in zip(corrections.add, pointed, strict=True):
         away = np.abs(speeds - one.speed)
         if len(found) and away.min() < one.radius:
-            tell(f"the ghost marked {_place(asked)} is ghost {int(away.argmin()) + 1}")
+            report(f"the ghost marked {_place(asked)} is ghost {int(away.argmin()) + 1}")
         else:
-            tell(f"no ghost that moves with the light was found {_place(asked)}: mark ignored")
+            report(f"no ghost that moves with the light was found {_place(asked)}: mark ignored")
 
 
 def without_removed(
-    corrections: Corrections, ghosts: Sequence[AberrationGhost], tell: Report
+    corrections: Corrections, ghosts: Sequence[AberrationGhost], report: Report
 ) -> tuple[AberrationGhost, ...]:
     """Drop the ghosts that the user removed, and report names that do not exist.
 
@@ -102,13 +102,13 @@ def without_removed(
     ----------
     corrections : Corrections
     ghosts : sequence of AberrationGhost
-    tell : callable
+    report : callable
         Receives one line per unknown name.
     """
     names = [ghost.name for ghost in ghosts]
     for name in corrections.remove:
         if name not in names:
-            tell(f"corrections: no ghost {name!r} to remove; found: {', '.join(names) or 'none'}")
+            report(f"corrections: no ghost {name!r} to remove; found: {', '.join(names) or 'none'}")
     return tuple(ghost for ghost in ghosts if ghost.name not in corrections.remove)
 
 

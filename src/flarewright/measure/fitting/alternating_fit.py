@@ -43,7 +43,7 @@ from .settings import FitSettings, Growth
 
 def fit_all(
     found: Sequence[DetectedGhost], views: Sequence[View], *, iris: Blades | None = None,
-    pool: ThreadPoolExecutor | None = None, tell: Report = lambda _: None,
+    pool: ThreadPoolExecutor | None = None, report: Report = lambda _: None,
     progress: Progress = lambda _part, _words: None, journal: Journal | None = None,
     settings: FitSettings = FitSettings(),
 ) -> list[DetectedGhost]:  # fmt: skip
@@ -57,7 +57,7 @@ def fit_all(
     iris : Blades, optional
         Allows rims of this iris beside a round rim in the first fit of a ghost.
     pool : executor, optional
-    tell : callable
+    report : callable
         Receives one line per round.
     progress : callable
         Receives the finished fraction and a text.
@@ -87,7 +87,7 @@ def fit_all(
         before = len(ghosts)
         ghosts = solve_intensities(ghosts, views, pool=pool, settings=settings)
         needed = "is needed" if len(ghosts) == 1 else "are needed"
-        tell(f"round {turn + 1}: {len(ghosts)} of {count(before, 'ghost')} {needed}")
+        report(f"round {turn + 1}: {len(ghosts)} of {count(before, 'ghost')} {needed}")
     return [ghosts[k] for k in by_brightness(ghosts)]
 
 

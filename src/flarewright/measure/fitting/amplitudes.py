@@ -52,10 +52,10 @@ def presences(
     whole = laid_out(patches)
     error = settings.model_error if error is None else error
     miss = residual_in(shape, whole, offset=False, error=error, tails=False, pool=pool, settings=settings)
-    reported = np.empty((len(whole.table), 2))
-    weigh_presence(whole.table, whole.pixels, miss.weight, miss.residual, settings.amplitude_outlier, reported)
+    found = np.empty((len(whole.table), 2))
+    weigh_presence(whole.table, whole.pixels, miss.weight, miss.residual, settings.amplitude_outlier, found)
     seen = [Presence(0.0, np.inf)] * len(views)
-    for patch, (amplitude, deviation) in zip(patches, reported, strict=True):
+    for patch, (amplitude, deviation) in zip(patches, found, strict=True):
         seen[patch.view] = Presence(float(amplitude), float(deviation))
     return seen
 

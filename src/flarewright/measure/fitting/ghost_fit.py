@@ -225,7 +225,7 @@ def refine(
 
     Notes
     -----
-    See `marquardt`; the Jacobian is the exact derivative of the drawn picture.
+    See `levenberg_marquardt`; the Jacobian is the exact derivative of the drawn picture.
     """
     error = settings.model_error if error is None else error
     alike = alike and error > 0.0

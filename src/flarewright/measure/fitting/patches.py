@@ -169,20 +169,20 @@ class PatchResidual:
 
     Attributes
     ----------
-    reported : ndarray, shape (P, 3)
+    sums : ndarray, shape (P, 3)
         One row per patch: weighted squares, sum of the weights, number of pixels with weight.
     weight, residual : ndarray, shape (S,)
         Pixels of all patches.
     """
 
-    reported: Floats
+    sums: Floats
     weight: Floats
     residual: Floats
 
     @property
     def costs(self) -> Floats:
         """Weighted squares of each patch, shape (P,)."""
-        return self.reported[:, 0]
+        return self.sums[:, 0]
 
     @property
     def cost(self) -> float:
@@ -192,7 +192,7 @@ class PatchResidual:
     @property
     def count(self) -> int:
         """Number of pixels with weight."""
-        return int(self.reported[:, 2].sum())
+        return int(self.sums[:, 2].sum())
 
 
 def residual_in(
@@ -200,7 +200,7 @@ def residual_in(
     pool: ThreadPoolExecutor | None = None, settings: FitSettings = FitSettings(),
 ) -> PatchResidual:  # fmt: skip
     """Draw a shape in patches and weigh the residual; see `ghost_fit.refine`."""
-    reported = np.zeros((len(patches.table), 3))
+    sums = np.zeros((len(patches.table), 3))
     weight, residual = np.empty(patches.pixels.size), np.empty(patches.pixels.size)
     # outliers may belong to unknown ghosts
     outlier = settings.outlier if error > 0.0 and tails else inf
@@ -208,11 +208,11 @@ def residual_in(
     def some(first: int, every: int) -> None:
         miss_patches(
             shape.numbers, shape.discs, patches.table, patches.sigmas, patches.frames, patches.pixels, patches.known,
-            max(error, 0.0), outlier, offset, first, every, _ROOM.some(patches.largest), weight, residual, reported,
+            max(error, 0.0), outlier, offset, first, every, _ROOM.some(patches.largest), weight, residual, sums,
         )  # fmt: skip
 
     dealt_out(some, len(patches.table), pool=pool if patches.pixels.size > _THREADED_PIXELS else None)
-    return PatchResidual(reported, weight, residual)
+    return PatchResidual(sums, weight, residual)
 
 
 def equations(
@@ -231,7 +231,7 @@ def equations(
     def some(first: int, every: int) -> None:
         weigh_changes(
             shape.numbers, shape.discs, free, patches.table, patches.sigmas, patches.frames, miss.weight, miss.residual,
-            miss.reported, offset, first, every, _ROOM.some(patches.largest * (size + 1)), matrices, sides,
+            miss.sums, offset, first, every, _ROOM.some(patches.largest * (size + 1)), matrices, sides,
         )  # fmt: skip
 
     dealt_out(some, count, pool=pool)

@@ -265,12 +265,12 @@ def followed(
     )
     padded = np.concatenate([parts[:1], parts, parts[-1:]])
     smooth = np.median(np.stack([padded[:-2], padded[1:-1], padded[2:]]), axis=0)
-    reported = [(view.constellation_deg, *map(float, row)) for view, row in zip(views, smooth, strict=True)]
+    rows = [(view.constellation_deg, *map(float, row)) for view, row in zip(views, smooth, strict=True)]
     return (
         None if halo is None else halo.model_copy(update={
-            "strength": tuple((row[0], row[1]) for row in reported), "even": tuple((row[0],
-            row[3:6]) for row in reported), }),
-        None if star is None else star.model_copy(update={"strength": tuple((row[0], row[2]) for row in reported)}),
+            "strength": tuple((row[0], row[1]) for row in rows), "even": tuple((row[0],
+            row[3:6]) for row in rows), }),
+        None if star is None else star.model_copy(update={"strength": tuple((row[0], row[2]) for row in rows)}),
     )  # fmt: skip
 
 

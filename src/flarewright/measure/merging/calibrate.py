@@ -300,8 +300,8 @@ def _points(
             free = np.concatenate([one.free.ravel() for one in parts])
             # actual exposure times differ from nominal ones; the well-lit pixels give the actual ratio
             lit = free & (around > settings.lit * float(around[free].max(initial=0.0)))
-            reported = float(first[lit].sum()) / float(second[lit].sum()) if lit.sum() > 1000 else ratio
-            honest = reported if 0.8 < reported / ratio < 1.25 else ratio
+            measured = float(first[lit].sum()) / float(second[lit].sum()) if lit.sum() > 1000 else ratio
+            honest = measured if 0.8 < measured / ratio < 1.25 else ratio
             found += transfers(first, second, around, min(honest, 1.0), free, samples[c], black_noise, settings)
     return found
 

@@ -379,5 +379,5 @@ def _without_path(
         roll = radians(one.nominal_roll_deg)
         path = _Path(centre, (cos(roll), -sin(roll)), (px_per_rad,), 0.0, 0.0, 0.0, 0, ((error**2,),))
         placed.append(_place(one, path, centre, path, settings))
-    reported = "the light was seen at one angle only; the axis is assumed to be the middle of the picture"
-    return Geometry(centre, (error, error), px_per_rad, (px_per_rad,), 0.0, tuple(placed), (reported,))
+    remark = "the light was seen at one angle only; the axis is assumed to be the middle of the picture"
+    return Geometry(centre, (error, error), px_per_rad, (px_per_rad,), 0.0, tuple(placed), (remark,))

@@ -57,11 +57,11 @@ def with_drift_gains(folder: Path, run: MergedRun, settings: DriftSettings = Dri
         for info in run.frames
     )
     spread = float(np.std([gain for gain, _ in gains.values()]))
-    reported = (
+    remark = (
         f"the light drifted by {spread:.2%} (standard deviation) from frame to frame, which is corrected; changes "
         f"slower than over {settings.slow_deg:g} degrees are attributed to the lens"
     )
-    return run.replace(frames=frames, remarks=(*run.remarks, reported))
+    return run.replace(frames=frames, remarks=(*run.remarks, remark))
 
 
 def _gains_of(

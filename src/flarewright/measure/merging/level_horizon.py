@@ -15,7 +15,7 @@ from ...typing import Floats, Pixels, Progress
 UPRIGHT = "upright"
 
 
-def make_upright(folder: Path, run: MergedRun, tell: Progress) -> MergedRun:
+def make_upright(folder: Path, run: MergedRun, progress: Progress) -> MergedRun:
     """Write all frames of a run rotated about the axis, so that the light's direction is exactly the captures' roll.
 
     Parameters
@@ -24,7 +24,7 @@ def make_upright(folder: Path, run: MergedRun, tell: Progress) -> MergedRun:
         Folder of the run.
     run : MergedRun
         With frames as photographed.
-    tell : callable
+    progress : callable
         Called with the finished part (0 to 1) and a description.
 
     Returns
@@ -49,9 +49,9 @@ def make_upright(folder: Path, run: MergedRun, tell: Progress) -> MergedRun:
         here: FrameInfo = frame.info.replace(file=f"{UPRIGHT}/{Path(info.file).name}")
         write_frame(folder, MergedFrame(here, frame.radiance, frame.variance))
         infos.append(here)
-        tell((k + 1) / len(run.frames), f"upright {k + 1} of {len(run.frames)}")
-    reported = "frames were turned upright (--upright): neighbouring pixels share some of their noise"
-    return run.replace(frames=tuple(infos), remarks=(*run.remarks, reported))
+        progress((k + 1) / len(run.frames), f"upright {k + 1} of {len(run.frames)}")
+    remark = "frames were turned upright (--upright): neighbouring pixels share some of their noise"
+    return run.replace(frames=tuple(infos), remarks=(*run.remarks, remark))
 
 
 def _turned_upright(frame: MergedFrame) -> MergedFrame:

@@ -22,7 +22,7 @@ from .track_stage import check_size, checked_ghosts
 
 def compress_ghosts(
     folder: Path, run: MergedRun, model: GhostModel, tracks: Tracks, *, every: int = 1, rest: bool = True,
-    threads: int | None = None, tell: Progress = lambda _part, _words: None, journal: Journal | None = None,
+    threads: int | None = None, progress: Progress = lambda _part, _words: None, journal: Journal | None = None,
     settings: MeasureSettings = MeasureSettings(),
 ) -> GhostModel:  # fmt: skip
     """Reduce a model to the curves that the frames of a run require; see `prune.compact_model`.
@@ -40,7 +40,7 @@ def compress_ghosts(
     rest : bool
         Whether to learn the residual beside the ghosts too. Without it the model has no sprites.
     threads : int, optional
-    tell : callable
+    progress : callable
         Called with the finished part (0 to 1) and a description.
     settings : MeasureSettings
 
@@ -58,7 +58,7 @@ def compress_ghosts(
         views = read_views(folder, run, every, pool)
         dim = subtract_glow(views, model.halo, model.star, pool, settings.glow)
     small = compact_model(
-        model, tracks, dim, threads=threads, tell=tell, journal=journal, settings=settings.compression
+        model, tracks, dim, threads=threads, progress=progress, journal=journal, settings=settings.compression
     )
     # free the memory before `with_residual` computes its own views
     del dim

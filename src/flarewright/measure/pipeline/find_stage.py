@@ -31,7 +31,7 @@ from .settings import MeasureSettings
 
 def find_ghosts(
     folder: Path, run: MergedRun, *, every: int = 1, corrections: Corrections | None = None, most: int = 60,
-    threads: int | None = None, tell: Report = lambda _: None, progress: Progress = lambda _part, _words: None,
+    threads: int | None = None, report: Report = lambda _: None, progress: Progress = lambda _part, _words: None,
     journal: Journal | None = None, settings: MeasureSettings = MeasureSettings(),
 ) -> GhostModel:  # fmt: skip
     """Detect the ghosts of a merged run.
@@ -47,7 +47,7 @@ def find_ghosts(
     most : int
         Largest number of ghosts.
     threads : int, optional
-    tell : callable
+    report : callable
         Called with a line for each ghost.
     progress : callable
         Called with the finished part (0 to 1) and a description.
@@ -77,25 +77,25 @@ def find_ghosts(
         pointed = [candidate(each, views, run, looked=len(seen), factor=factor) for each in known.add]
         measured = [all_finite(view.variance) for view in small]
         found = pursue(
-            seen, measured, most=most, first=pointed, iris=iris, factor=factor, pool=pool, tell=tell,
+            seen, measured, most=most, first=pointed, iris=iris, factor=factor, pool=pool, report=report,
             progress=progress, journal=journal, settings=detection,
         )  # fmt: skip
         found = solve_intensities(found, seen, pool=pool, settings=fit)
-        found = join_ghosts(found, seen, factor=factor, pool=pool, tell=tell, settings=detection)
+        found = join_ghosts(found, seen, factor=factor, pool=pool, report=report, settings=detection)
         found = restart_jointly(found, seen, pool=pool, journal=journal, settings=fit)
         found = solve_intensities(found, small, pool=pool, settings=fit)
         found = split_ghosts(
-            found, small, iris=iris, factor=factor, pool=pool, tell=tell, journal=journal, settings=detection
+            found, small, iris=iris, factor=factor, pool=pool, report=report, journal=journal, settings=detection
         )
         found = solve_intensities(found, small, pool=pool, settings=fit)
-    report_marks(known, pointed, found, tell)
+    report_marks(known, pointed, found, report)
     whole = [scaled_ghost(ghost, factor) for ghost in found]
     ghosts = to_model(whole, searched)
     rejected = is_residual_glow(whole, searched, settings.glow.rejection)
     glow = [ghost.name for ghost, left in zip(ghosts, rejected, strict=True) if left]
     for name in glow:
-        tell(f"ghost {name} is no brighter than the residual of halo and star: left out")
-    wanted = tuple(ghost for ghost in without_removed(known, ghosts, tell) if ghost.name not in glow)
+        report(f"ghost {name} is no brighter than the residual of halo and star: left out")
+    wanted = tuple(ghost for ghost in without_removed(known, ghosts, report) if ghost.name not in glow)
     return model_of_run(run, wanted, dim, views).replace(
         removed=tuple(ghost for ghost in ghosts if ghost not in wanted)
     )

@@ -37,7 +37,7 @@ from .settings import MeasureSettings
 
 def fit_ghosts(
     folder: Path, run: MergedRun, rough: GhostModel, *, every: int = 1, again: int = 1, most: int = 60,
-    rest: bool = True, threads: int | None = None, tell: Report = lambda _: None,
+    rest: bool = True, threads: int | None = None, report: Report = lambda _: None,
     progress: Progress = lambda _part, _words: None, journal: Journal | None = None,
     settings: MeasureSettings = MeasureSettings(),
 ) -> GhostModel:  # fmt: skip
@@ -58,7 +58,7 @@ def fit_ghosts(
     rest : bool
         Whether to learn the residual beside the ghosts too; `compress_ghosts` recomputes it.
     threads : int, optional
-    tell, progress, journal
+    report, progress, journal
         As for `find_ghosts`.
     settings : MeasureSettings
 
@@ -82,22 +82,22 @@ def fit_ghosts(
         iris = iris_of(dim.star, settings.glow.star)
         parts = iter(_parts(2 * again + 1, progress))
         settled = fit_all(
-            found, dim.views, iris=iris, pool=pool, tell=tell, progress=next(parts), journal=journal,
+            found, dim.views, iris=iris, pool=pool, report=report, progress=next(parts), journal=journal,
             settings=settings.fit,
         )  # fmt: skip
         for _ in range(again):
             # with more ghosts known the glow is estimated better, and fainter ghosts can be detected
             dim = fit_and_subtract_glow(settled, views, dim.star, pool, settings.glow)
             more = _search_residual(
-                settled, views, dim.views, most - len(settled), iris, pool, tell, next(parts), journal, settings
+                settled, views, dim.views, most - len(settled), iris, pool, report, next(parts), journal, settings
             )
             settled += with_glow_unwanted(more, views, settings.glow.rejection)
-            settled = _rejoined(settled, dim.views, pool, tell, settings.detection)
+            settled = _rejoined(settled, dim.views, pool, report, settings.detection)
             settled = split_ghosts(
-                settled, dim.views, iris=iris, pool=pool, tell=tell, journal=journal, settings=settings.detection
+                settled, dim.views, iris=iris, pool=pool, report=report, journal=journal, settings=settings.detection
             )
             settled = fit_all(
-                settled, dim.views, iris=iris, pool=pool, tell=tell, progress=next(parts),
+                settled, dim.views, iris=iris, pool=pool, report=report, progress=next(parts),
                 journal=journal, settings=settings.fit,
             )  # fmt: skip
         dim = fit_and_subtract_glow(settled, views, dim.star, pool, settings.glow)
@@ -117,7 +117,7 @@ def _parts(count: int, progress: Progress) -> list[Progress]:
 
 def _search_residual(
     known: Sequence[DetectedGhost], views: Sequence[View], subtracted: Sequence[View], most: int, iris: Blades | None,
-    pool: ThreadPoolExecutor, tell: Report, progress: Progress, journal: Journal | None, settings: MeasureSettings,
+    pool: ThreadPoolExecutor, report: Report, progress: Progress, journal: Journal | None, settings: MeasureSettings,
 ) -> list[DetectedGhost]:  # fmt: skip
     """Search more ghosts in the residual of the known ones, at the search's resolution."""
     numbers = evenly_spaced(range(len(views)), settings.detection.views)
@@ -130,7 +130,7 @@ def _search_residual(
     left = np.stack([residual_of(ghosts, small, m, pool) for m in range(CHANNELS)], axis=-1)
     found = pursue(
         seen, measured, most=max(most, 0), rest=[mixture(each, share) for each in left], iris=iris,
-        factor=2.0**times, pool=pool, tell=tell, progress=progress, journal=journal, settings=settings.detection,
+        factor=2.0**times, pool=pool, report=report, progress=progress, journal=journal, settings=settings.detection,
     )  # fmt: skip
     return [
         replace(scaled_ghost(ghost, 2.0**times), first=numbers[ghost.first], last=numbers[ghost.last])
@@ -145,13 +145,13 @@ def _in_subset(ghost: DetectedGhost, numbers: Sequence[int]) -> DetectedGhost:
 
 
 def _rejoined(
-    ghosts: Sequence[DetectedGhost], views: Sequence[View], pool: ThreadPoolExecutor, tell: Report,
+    ghosts: Sequence[DetectedGhost], views: Sequence[View], pool: ThreadPoolExecutor, report: Report,
     settings: DetectionSettings,
 ) -> list[DetectedGhost]:  # fmt: skip
     """Join fragments of one ghost at the search's resolution; after a fit they are easier to recognise."""
     times, small = search_views(views, settings)
     smaller = [scaled_ghost(ghost, 0.5**times) for ghost in ghosts]
-    found = join_ghosts(smaller, small, factor=2.0**times, pool=pool, tell=tell, settings=settings)
+    found = join_ghosts(smaller, small, factor=2.0**times, pool=pool, report=report, settings=settings)
     return [scaled_ghost(ghost, 2.0**times) for ghost in found]
 
 

@@ -142,24 +142,24 @@ def merge_captures(
     OutputError
         When the folder cannot be written or has too little space.
     """
-    tell = progress or (lambda _part, _words: None)
-    tell(0.0, "reading the photographs")
+    advance = progress or (lambda _part, _words: None)
+    advance(0.0, "reading the photographs")
     known = calibrate(captures, folder, camera or CameraNoise(), settings.block, settings)
     groups = exposure_groups(captures)
     balance = _balance(settings, known, folder / groups[0][0].file)
     _refuse_other_run(output, folder, captures, known.size_px)
     output = _folder(output, len(groups), known.size_px)
-    merged = _merge_all(groups, folder, output, known, balance, threads, tell, settings, report, spread)
+    merged = _merge_all(groups, folder, output, known, balance, threads, advance, settings, report, spread)
     found = believable([one.sighting for one in merged], settings.geometry)
-    tell(0.95, "axis")
+    advance(0.95, "axis")
     geometry = _geometry(merged, found, output, known, settings.geometry)
     refuse_second_light([one.sighting for one in merged], geometry, settings.light)
     run = with_drift_gains(output, _run(merged, geometry, known, balance, remarks), settings.drift)
     if settings.upright:
-        run = make_upright(output, run, lambda part, words: tell(0.96 + 0.04 * part, words))
+        run = make_upright(output, run, lambda part, words: advance(0.96 + 0.04 * part, words))
     write_run(output, run)
     _drop_stale(output, len(groups))
-    tell(1.0, "merged")
+    advance(1.0, "merged")
     return run
 
 
@@ -222,10 +222,10 @@ def _refuse_other_run(output: Path, folder: Path, captures: Sequence[Capture], s
         known = {tuple(stamp) for stamp in one["files"]}
         if known & files or (one["folder"] == here["folder"] and names & {name for name, *_ in known}):
             return
-    reported = origins[0]["files"][0][0] if origins else _other_size(output, size_px)
-    if reported is not None:
+    other = origins[0]["files"][0][0] if origins else _other_size(output, size_px)
+    if other is not None:
         raise FlarewrightError(
-            f"{output} holds the run of other photographs ({reported}): choose another folder, or remove that one first"
+            f"{output} holds the run of other photographs ({other}): choose another folder, or remove that one first"
         )
 
 
@@ -248,8 +248,8 @@ def _drop_stale(output: Path, frames: int) -> None:
 
 def _merge_all(
     groups: Sequence[tuple[Capture, ...]], folder: Path, output: Path, known: CameraCalibration,
-    balance: tuple[float, float, float], threads: int | None, tell: Progress, settings: MergeSettings, report: Report,
-    spread: Spread | None,
+    balance: tuple[float, float, float], threads: int | None, progress: Progress, settings: MergeSettings,
+    report: Report, spread: Spread | None,
 ) -> list[_Merged]:  # fmt: skip
     # what follows the frames is not in their digest; white balance and block are in `balance` and `known`
     steering = MergeSettings(calibration=settings.calibration, exposures=settings.exposures, light=settings.light)
@@ -267,7 +267,7 @@ def _merge_all(
             for line in one.lines:
                 report(line)
             merged[one.number] = one.merged
-            tell(0.02 + 0.93 * len(merged) / len(groups), f"frame {len(merged)} of {len(groups)}")
+            progress(0.02 + 0.93 * len(merged) / len(groups), f"frame {len(merged)} of {len(groups)}")
     return [merged[k] for k in range(len(groups))]
 
 

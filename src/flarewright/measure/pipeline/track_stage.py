@@ -26,7 +26,7 @@ from .settings import MeasureSettings
 
 def track_ghosts(
     folder: Path, run: MergedRun, model: GhostModel, *, every: int = 1, threads: int | None = None,
-    tell: Progress = lambda _part, _words: None, journal: Journal | None = None,
+    progress: Progress = lambda _part, _words: None, journal: Journal | None = None,
     settings: MeasureSettings = MeasureSettings(),
 ) -> Tracks:  # fmt: skip
     """Track a model's ghosts through the frames of a run.
@@ -41,7 +41,7 @@ def track_ghosts(
         Step between the constellations used.
     threads : int, optional
         The tracks do not depend on it.
-    tell : callable
+    progress : callable
         Called with the finished part (0 to 1) and a description.
     journal : Journal, optional
         Journal of an interrupted run to resume; it does not change the result.
@@ -64,7 +64,7 @@ def track_ghosts(
         small = map_batched(partial(halved_view, times=times), views, pool=pool)
     ghosts = [_shapes(ghost, 0.5**times) for ghost in checked_ghosts(model)]
     names, how = [ghost.name for ghost in model.ghosts], settings.tracking
-    tracks = follow(names, ghosts, small, threads=threads, tell=tell, journal=journal, settings=how)
+    tracks = follow(names, ghosts, small, threads=threads, progress=progress, journal=journal, settings=how)
     return tracks if times == 0 else _enlarged(tracks, 2.0**times)
 
 

@@ -33,8 +33,8 @@ def ways_on(moves: Moves, k: int, part: float) -> Floats:
     ndarray, shape (WAYS, rows, columns, 2)
         Cells of the sprite, down and along.
     """
-    reported = [moved_vectors(steps, moves.block, part - 0.5)[..., :2] for steps in moves.steps(k)]
-    return np.stack([np.zeros_like(reported[0]), *reported])
+    moved = [moved_vectors(steps, moves.block, part - 0.5)[..., :2] for steps in moves.steps(k)]
+    return np.stack([np.zeros_like(moved[0]), *moved])
 
 
 def fine(values: Floats, sprite: Sprite, block: int, parts: int) -> Floats:

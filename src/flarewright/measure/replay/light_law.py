@@ -51,7 +51,7 @@ def light_of_view(model: GhostModel, view: View) -> tuple[float, float]:
 
     Near the axis a nodding camera changes the light's direction, so that the roll does not determine the position.
     """
-    reported = light_px(model, view.constellation_deg, view.roll_deg)
-    off = np.hypot(*np.subtract(view.light_px, reported))
+    by_law = light_px(model, view.constellation_deg, view.roll_deg)
+    off = np.hypot(*np.subtract(view.light_px, by_law))
     inside = all(0.0 <= at <= side for at, side in zip(view.light_px, view.size_px, strict=True))
-    return view.light_px if inside and off < _NEAR_LAW * view.size_px[0] else reported
+    return view.light_px if inside and off < _NEAR_LAW * view.size_px[0] else by_law

@@ -439,19 +439,19 @@ def sensor_of(project: Project, model: GhostModel) -> tuple[float, float]:
 
 
 def _remarks(project: Project, flare: MeasuredFlare, seen: Sequence[_Seen], total: Layer) -> tuple[str, ...]:
-    reported = [UNIT]
-    reported += [
+    remarks = [UNIT]
+    remarks += [
         f"{one.light.name} stands {abs(one.beyond_deg):.4g} degrees off the axis, which was not photographed: it is "
         f"drawn at the limit, {abs(one.constellation_deg):.4g} degrees"
         for one in seen
         if one.beyond_deg is not None
     ]
     if flare.model.to_rec709 is None:
-        reported.append(OWN_COLOURS)
+        remarks.append(OWN_COLOURS)
     if any(one.light.spectrum != D65() for one in seen):
-        reported.append(TINTED)
+        remarks.append(TINTED)
     if not project.output.starburst:
-        reported.append(LIGHT_ITSELF)
+        remarks.append(LIGHT_ITSELF)
     if not total.pixels.any():
-        reported.append(BLACK if any(one.part > 0.0 for one in seen) else HIDDEN)
-    return tuple(reported)
+        remarks.append(BLACK if any(one.part > 0.0 for one in seen) else HIDDEN)
+    return tuple(remarks)

@@ -81,9 +81,9 @@ def brightness_gain(reference: Reference, camera: ReplayCamera) -> float:
     except (OverflowError, ZeroDivisionError):
         gain = inf
     if not _FAINTEST <= gain <= 1.0 / _FAINTEST:
-        reported = ", ".join(f"{name} {getattr(camera, name):g}" for name in ratios)
+        named = ", ".join(f"{name} {getattr(camera, name):g}" for name in ratios)
         raise FlarewrightError(
-            f"{reported} make the flare {gain:g} times as bright as in the captures; check these settings"
+            f"{named} make the flare {gain:g} times as bright as in the captures; check these settings"
         )
     return gain
 

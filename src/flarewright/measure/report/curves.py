@@ -87,8 +87,10 @@ def _followed(ghost: AberrationGhost | BezierGhost, model: GhostModel, steps: in
         return _Followed(ghost, angles, middles_of(ghost, angles, model.largest_deg))
     values = np.array([bezier_numbers(ghost, angle) for angle in angles.tolist()]).T
     values[_CENTRE] *= side_of(angles)
-    reported = [*ghost.uncertainty, *[0.0] * (len(values) - len(ghost.uncertainty))]
-    return _Followed(ghost, angles, None, [Known(a, np.full(a.size, d)) for a, d in zip(values, reported, strict=True)])
+    deviations = [*ghost.uncertainty, *[0.0] * (len(values) - len(ghost.uncertainty))]
+    return _Followed(
+        ghost, angles, None, [Known(a, np.full(a.size, d)) for a, d in zip(values, deviations, strict=True)]
+    )
 
 
 def _charts(shown: Sequence[_Followed], colours: Mapping[str, str], corner_px: float) -> list[Chart]:
@@ -97,9 +99,9 @@ def _charts(shown: Sequence[_Followed], colours: Mapping[str, str], corner_px: f
     curves = [one for one in shown if one.middles is None]
 
     def drawn(
-        title: str, ghosts: Sequence[_Followed], reported: Iterable[Known], y_label: str, rises: bool = False
+        title: str, ghosts: Sequence[_Followed], quantities: Iterable[Known], y_label: str, rises: bool = False
     ) -> Chart:
-        lines = [_series(one, known, colours) for one, known in zip(ghosts, reported, strict=True)]
+        lines = [_series(one, known, colours) for one, known in zip(ghosts, quantities, strict=True)]
         # a single curve has no legend, so the title names its ghost
         whose = f": ghost {lines[0].label}" if len(lines) == 1 else ""
         # one decade more than the data, so that no curve runs along the bottom
@@ -133,12 +135,12 @@ def _series(one: _Followed, known: Known, colours: Mapping[str, str]) -> Series:
 
 def _places(ghosts: Sequence[_Followed], colour: int, corner_px: float) -> list[Known]:
     """Return the places of green, or the shift of another colour from green, restricted to those that are drawn."""
-    reported = [_quantity(one, PLACE) if colour == _GREEN else _shift(one, colour) for one in ghosts]
+    places = [_quantity(one, PLACE) if colour == _GREEN else _shift(one, colour) for one in ghosts]
     inside = [
         np.maximum(np.abs(_quantity(one, PLACE).value), np.abs(_quantity(one, PLACE, colour).value)) <= corner_px
         for one in ghosts
     ]
-    both = list(zip(reported, inside, strict=True))
+    both = list(zip(places, inside, strict=True))
     off = np.abs(np.concatenate([np.zeros(0), *(known.value[there] for known, there in both)]))
     most = _OUTLIER * float(np.quantile(off, _OUTLIER_QUANTILE)) if off.size else 0.0
     return [_masked(known, there & (np.abs(known.value) <= most)) for known, there in both]
@@ -146,10 +148,10 @@ def _places(ghosts: Sequence[_Followed], colour: int, corner_px: float) -> list[
 
 def _brightnesses(ghosts: Sequence[_Followed]) -> list[Known]:
     """Return the brightnesses, restricted to the decades of the chart."""
-    reported = [_quantity(one, RADIANCE) for one in ghosts]
-    whole = np.concatenate([np.zeros(0), *(known.value for known in reported)])
+    levels = [_quantity(one, RADIANCE) for one in ghosts]
+    whole = np.concatenate([np.zeros(0), *(known.value for known in levels)])
     least = float(whole[np.isfinite(whole)].max(initial=0.0)) * 10.0**-_DECADES
-    return [_masked(known, known.value > max(least, 0.0)) for known in reported]
+    return [_masked(known, known.value > max(least, 0.0)) for known in levels]
 
 
 def _masked(known: Known, drawn: Mask) -> Known:
@@ -179,5 +181,5 @@ def _row(one: _Followed, colours: bool) -> tuple[str, ...]:
     cells = [(_quantity(one, PLACE), 1.0), (_quantity(one, SIZE), 1.0), *((known, brightest) for known in light)]
     if colours:
         cells += [(_shift(one, _RED), 1.0), (_shift(one, _BLUE), 1.0)]
-    reported = (with_deviation(float(known.value[0]), float(known.deviation[0]), least) for known, least in cells)
-    return f"{one.ghost.name}, at {one.constellation_deg[0]:.1f}", *reported
+    words = (with_deviation(float(known.value[0]), float(known.deviation[0]), least) for known, least in cells)
+    return f"{one.ghost.name}, at {one.constellation_deg[0]:.1f}", *words

@@ -172,8 +172,8 @@ def _outlined(
         # a dark outline keeps the name readable over light
         names += [Text(at[0] + i, at[1] + j, name, _NAME_PX, "#101418", "middle") for i in (-1, 1) for j in (-1, 1)]
         names.append(Text(*at, name, _NAME_PX, colour, "middle"))
-    reported = f"{frame.constellation_deg:.2f} degrees, {count(len(taken), 'ghost')} in the picture"
-    words = Text(6.0, height + 15.0, reported, 11.0)
+    sentence = f"{frame.constellation_deg:.2f} degrees, {count(len(taken), 'ghost')} in the picture"
+    words = Text(6.0, height + 15.0, sentence, 11.0)
     return Chart(width, height + 22, f"Ghosts at {frame.constellation_deg:.2f} degrees",
                   (EmbeddedImage(0.0, 0.0, width, height, pixels), *names, words))  # fmt: skip
 

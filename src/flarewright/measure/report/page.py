@@ -151,11 +151,11 @@ def _ratios(folder: Path, run: MergedRun) -> str:
         except (ValueError, KeyError, TypeError):
             # FileError is a ValueError
             continue
-    reported = [
+    parts = [
         f"{seconds:.4g} s: {_with_error(float(np.mean(found)), float(np.std(found)) or None)}"
         for seconds, found in sorted(noted.items())
     ]
-    return ", ".join(reported) or "unknown"
+    return ", ".join(parts) or "unknown"
 
 
 def _drift(run: MergedRun) -> str:

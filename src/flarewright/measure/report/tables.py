@@ -72,8 +72,8 @@ def _channel_rows(ghost: AberrationGhost) -> Iterator[tuple[str, ...]]:
             # terms of one polynomial share the scale of their largest
             first = at - at % FIRST_G if at < FIRST_DISC else at
             most = float(np.abs(values[:, first : first + FIRST_G if at < FIRST_DISC else at + 1]).max())
-            reported = zip(values[:, at].tolist(), deviations[:, at].tolist(), strict=True)
-            yield label, *(with_deviation(value, deviation, most) for value, deviation in reported)
+            pairs = zip(values[:, at].tolist(), deviations[:, at].tolist(), strict=True)
+            yield label, *(with_deviation(value, deviation, most) for value, deviation in pairs)
 
 
 def _curve_rows(curves: Curves, visible_deg: tuple[float, float]) -> Iterator[tuple[str, ...]]:
@@ -87,10 +87,10 @@ def _curve_rows(curves: Curves, visible_deg: tuple[float, float]) -> Iterator[tu
 
 def _bezier_rows(ghost: BezierGhost) -> Iterator[tuple[str, ...]]:
     midway = bezier_numbers(ghost, 0.5 * sum(ghost.visible_deg))
-    reported = [*ghost.uncertainty, *[0.0] * (midway.size - len(ghost.uncertainty))]
+    pairs = [*ghost.uncertainty, *[0.0] * (midway.size - len(ghost.uncertainty))]
     # scales: 1 for pixels and exponents, the largest level for levels
     matters = [1.0] * BORDER + [float(midway[BORDER:].max())] * (midway.size - BORDER)
     for label, value, deviation, least, row in zip(
-        _BEZIER, midway.tolist(), reported, matters, ghost.numbers, strict=True
+        _BEZIER, midway.tolist(), pairs, matters, ghost.numbers, strict=True
     ):
         yield label, with_deviation(value, deviation, least), ", ".join(number(each) for each in row)

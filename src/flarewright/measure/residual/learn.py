@@ -102,9 +102,9 @@ def around_light(view: View, pixels: Pixels) -> Pixels:
     known = np.isfinite(light).all(axis=1)
     gaps = np.isnan(light).any(axis=1) & np.isfinite(view.variance[near]).all(axis=1)
     for far in np.unique(ring[gaps]):
-        reported = light[known & (ring == far)]
-        if reported.size:
-            light[gaps & (ring == far)] = np.median(reported, axis=0)
+        beside = light[known & (ring == far)]
+        if beside.size:
+            light[gaps & (ring == far)] = np.median(beside, axis=0)
     out = pixels.copy()
     out[near] = light
     return out

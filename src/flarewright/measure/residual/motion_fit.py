@@ -127,8 +127,8 @@ def _coarse(here: Pixels, there: Pixels, unit: float, times: int) -> Indices:
     small, other = _half_as_fine(here), _half_as_fine(there)
     # the mean of four cells has half their noise
     found, _ = _agreed(small, other, 0.5 * unit, _coarse(small, other, 0.5 * unit, times - 1))
-    reported = 2 * found[np.ix_(rows // (2 * _BLOCK), columns // (2 * _BLOCK))]
-    return np.asarray(np.sign(reported) * np.maximum(np.abs(reported) - (_REACH - _COARSE), 0))
+    motion = 2 * found[np.ix_(rows // (2 * _BLOCK), columns // (2 * _BLOCK))]
+    return np.asarray(np.sign(motion) * np.maximum(np.abs(motion) - (_REACH - _COARSE), 0))
 
 
 def _half_as_fine(picture: Pixels) -> Pixels:

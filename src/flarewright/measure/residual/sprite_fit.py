@@ -291,10 +291,10 @@ def pictures_over(
     ndarray, shape (K, rows, columns, 3), float32
         Cells with too few views, in total or near an image's constellation, are filled from their neighbours.
     """
-    reported, knots = np.array([view.constellation_deg for view in views]), np.array(angles)
+    angles_deg, knots = np.array([view.constellation_deg for view in views]), np.array(angles)
     flat, shape = (len(views), -1), (len(angles), *noise.shape)
-    found = over_angles(values.reshape(flat), weights.reshape(flat), reported, knots, pool)
-    near = seen_near(weights.reshape(flat), reported, knots)
+    found = over_angles(values.reshape(flat), weights.reshape(flat), angles_deg, knots, pool)
+    near = seen_near(weights.reshape(flat), angles_deg, knots)
     total = weights.sum(axis=0)
     known = total >= ENOUGH * len(views) / max(len(angles), VIEWS)
     noise = np.where(known, noise * len(angles) / np.maximum(total, 1e-9) ** 2, 0.0)
@@ -309,14 +309,14 @@ def _window(count: int) -> Pixels:
 
 
 def over_angles(
-    values: Pixels, weights: Pixels, reported: Floats, knots: Floats, pool: ThreadPoolExecutor | None = None
+    values: Pixels, weights: Pixels, angles_deg: Floats, knots: Floats, pool: ThreadPoolExecutor | None = None
 ) -> Pixels:
     """Fit every cell over the constellation, linearly between knots, robust against outliers; shape (K, cells)."""
-    basis = _hats(reported, knots)
+    basis = _hats(angles_deg, knots)
     count = knots.size
     bend, slope = np.diff(np.eye(count), 2, axis=0), np.diff(np.eye(count), axis=0)
     stiff = _BEND * bend.T @ bend + _SLOPE * slope.T @ slope + 1e-6 * np.eye(count)
-    products = (basis[:, :, None] * basis[:, None, :]).reshape(reported.size, -1)
+    products = (basis[:, :, None] * basis[:, None, :]).reshape(angles_deg.size, -1)
     out = np.zeros((count, values.shape[1]), np.float32)
     seen = np.flatnonzero(weights.any(axis=0))
 
@@ -339,23 +339,23 @@ def over_angles(
     return out
 
 
-def seen_near(weights: Pixels, reported: Floats, knots: Floats) -> Mask:
+def seen_near(weights: Pixels, angles_deg: Floats, knots: Floats) -> Mask:
     """Return which cells views show near each constellation; elsewhere a fit only extrapolates; shape (K, cells).
 
     Where the light rolls, images contain such cells: to the right of a light that was always at the right, for example.
     """
-    hats = _hats(reported, knots)
+    hats = _hats(angles_deg, knots)
     least = np.minimum(ENOUGH, 0.5 * hats.sum(axis=0))
     return np.asarray(hats.T @ weights >= least[:, None])
 
 
-def _hats(reported: Floats, knots: Floats) -> Floats:
+def _hats(angles_deg: Floats, knots: Floats) -> Floats:
     """Return the weight of each knot at some constellations, linear between knots, shape (V, K)."""
     if knots.size == 1:
-        return np.ones((reported.size, 1))
-    k, part = sprite_interval(knots, reported)
-    basis = np.zeros((reported.size, knots.size))
-    basis[np.arange(reported.size), k], basis[np.arange(reported.size), k + 1] = 1.0 - part, part
+        return np.ones((angles_deg.size, 1))
+    k, part = sprite_interval(knots, angles_deg)
+    basis = np.zeros((angles_deg.size, knots.size))
+    basis[np.arange(angles_deg.size), k], basis[np.arange(angles_deg.size), k + 1] = 1.0 - part, part
     return basis
 
 

@@ -29,7 +29,7 @@ _History = list[list[tuple[float, Pose]]]
 
 def follow(
     names: Sequence[str], ghosts: Sequence[Shapes], views: Sequence[View], *, threads: int | None = None,
-    tell: Progress = lambda _part, _words: None, journal: Journal | None = None,
+    progress: Progress = lambda _part, _words: None, journal: Journal | None = None,
     settings: TrackingSettings = TrackingSettings(),
 ) -> Tracks:  # fmt: skip
     """Track all ghosts over all views.
@@ -43,7 +43,7 @@ def follow(
         In order of rising constellation, with halo and star subtracted.
     threads : int, optional
         None: two, one per direction; the tracks do not depend on it.
-    tell : callable
+    progress : callable
         Receives the finished fraction and a text.
     journal : Journal, optional
         Resumes an interrupted run; the result does not depend on it.
@@ -53,7 +53,7 @@ def follow(
     -----
     A line through the last few frames that show a ghost predicts its pose in the next, as in Walch 2017, section 7.3.
     Two passes run with rising and falling constellation; each frame keeps the pass with the lower cost. The prediction
-    only provides start values: the reported values are measured in the frame.
+    only provides start values: the of_ghost values are measured in the frame.
     """
     order = list(range(len(views)))
     if not ghosts:
@@ -78,15 +78,15 @@ def follow(
                 for g, pose in enumerate(here.poses):
                     if _state(here, g, radii[g], settings) == "seen" and np.isfinite(here.error[g]).all():
                         past[g] = [*past[g], (views[k].constellation_deg, pose)][-settings.history :]
-            tell((done + 1) / len(views), f"{views[places[0]].constellation_deg:.1f} degrees")
+            progress((done + 1) / len(views), f"{views[places[0]].constellation_deg:.1f} degrees")
     measured = [down[k] if down[k].cost < up[k].cost else up[k] for k in order]
     angles = np.array([view.constellation_deg for view in views])
     tracks = []
     for g, name in enumerate(names):
-        reported = tuple(
+        of_ghost = tuple(
             _step(one, g, float(angle), radii[g], settings) for one, angle in zip(measured, angles, strict=True)
         )
-        tracks.append(GhostTrack(name=name, lives=lives(reported, settings), steps=reported))
+        tracks.append(GhostTrack(name=name, lives=lives(of_ghost, settings), steps=of_ghost))
     return Tracks(ghosts=tuple(tracks))
 
 

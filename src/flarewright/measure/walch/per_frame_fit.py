@@ -40,7 +40,7 @@ _LENGTHS = 11
 
 def fit_as_walch(
     folder: Path, run: MergedRun, rough: GhostModel, *, every: int = 1, rest: bool = True, threads: int | None = None,
-    tell: Report = lambda _: None, progress: Progress = lambda _part, _words: None, journal: Journal | None = None,
+    report: Report = lambda _: None, progress: Progress = lambda _part, _words: None, journal: Journal | None = None,
     settings: WalchSettings = WalchSettings(),
 ) -> GhostModel:  # fmt: skip
     """Fit the detected ghosts with Walch's primitive and method.
@@ -56,7 +56,7 @@ def fit_as_walch(
     rest : bool
         Whether to learn the residual beside the ghosts too.
     threads : int, optional
-    tell, progress, journal
+    report, progress, journal
         As for `find_ghosts`.
     settings : WalchSettings
 
@@ -90,13 +90,13 @@ def fit_as_walch(
 
             for name, (angles, numbers) in zip(some, steps.step(look), strict=True):
                 if len(angles) < settings.least_images:
-                    tell(f"ghost {name}: fewer than {settings.least_images} pictures show it, left out")
+                    report(f"ghost {name}: fewer than {settings.least_images} pictures show it, left out")
                     continue
                 found.append(_compressed(name, angles, numbers, settings))
-                tell(f"ghost {name}: {count(len(angles), 'picture')}")
+                report(f"ghost {name}: {count(len(angles), 'picture')}")
             progress(min(begin + _AT_ONCE, len(names)) / len(names), f"ghost {some[-1]}")
-    reported = "fitted with Walch's primitive and by his gradient descent (2017), for comparison"
-    model = bare.replace(ghosts=tuple(found), remarks=(*rough.remarks, reported))
+    remark = "fitted with Walch's primitive and by his gradient descent (2017), for comparison"
+    model = bare.replace(ghosts=tuple(found), remarks=(*rough.remarks, remark))
     return with_residual(model, views, threads, journal) if rest else model
 
 

@@ -275,8 +275,8 @@ def _estimate(sums: Sums, quality: Quality, run: ReferenceRun, begin: float) -> 
         parts.append((quality.reference_error / max(error, 1e-300)) ** 2)
     if run.time_limit_s is not None:
         parts.append((time.monotonic() - begin) / run.time_limit_s)
-    reported = f"error {error:.2%}" if error < inf else "first rays"
-    return min(1.0, max(parts)), f"{reported}, {sums.batches * SIDE**2 / 1e6:.2f} million points"
+    words = f"error {error:.2%}" if error < inf else "first rays"
+    return min(1.0, max(parts)), f"{words}, {sums.batches * SIDE**2 / 1e6:.2f} million points"
 
 
 def _finish(
@@ -314,8 +314,8 @@ def _finish(
         limit = "the number of samples" if reason == "samples" else "the time"
         remarks.append(f"{limit} ended the render before the target error of {quality.reference_error:.2%}")
     if from_camera:
-        reported = ", ".join(str(number) for number in from_camera)
-        remarks.append(f"the ghosts of area lights were traced from the sensor: lights {reported}, counted from 0")
+        words = ", ".join(str(number) for number in from_camera)
+        remarks.append(f"the ghosts of area lights were traced from the sensor: lights {words}, counted from 0")
     if flux == 0.0:
         remarks.append("no ray met a ghost in the picture")
     return ReferencePass(

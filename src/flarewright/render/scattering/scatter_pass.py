@@ -71,11 +71,11 @@ COARSE = Sampling(8, 36, 16, 12)
 
 def chosen_scatter(settled: ResolvedProject) -> Scatter | None:
     """Return the scatter settings of the project, or else of the lens file; None if nothing scatters."""
-    reported = settled.project.scatter
-    chosen = settled.lens.scatter if reported is None else reported
+    wanted = settled.project.scatter
+    chosen = settled.lens.scatter if wanted is None else wanted
     if chosen is None or chosen.model == "none":
         return None
-    if reported is None and settled.project.filter is not None and chosen.rows:
+    if wanted is None and settled.project.filter is not None and chosen.rows:
         # the lens file numbers its rows without those of the filter
         moved = tuple(exception.replace(row=exception.row + FILTER_ROWS) for exception in chosen.rows)
         return chosen.replace(rows=moved)
@@ -149,9 +149,9 @@ def scatter_facts(settled: ResolvedProject, tables: Sequence[ScatterTables]) -> 
         "share_by_row": [float(share) for share in tables[0].shares[middle]],
         "direct_kept": float(tables[0].kept[middle]),
     }
-    reported = f"surfaces scatter up to {lost:.2%} of the direct light; ghosts are drawn as if they lost nothing by it"
+    remark = f"surfaces scatter up to {lost:.2%} of the direct light; ghosts are drawn as if they lost nothing by it"
     final = settled.project.quality.mode != "reference"
-    return facts, (reported,) if final and lost > REPORTED_SHARE else ()
+    return facts, (remark,) if final and lost > REPORTED_SHARE else ()
 
 
 def render_scatter(

@@ -45,7 +45,7 @@ def as_photographed(project: Project, said: AbstractSet[str] = frozenset()) -> t
     -------
     project : Project
         With an f-number, a coating, rounded blades and sizes of lights where they were not given.
-    reported : tuple of str
+    chosen : tuple of str
         Short descriptions of what was filled in.
 
     Examples
@@ -57,31 +57,31 @@ def as_photographed(project: Project, said: AbstractSet[str] = frozenset()) -> t
     """
     if not isinstance(project.lens, str) or not in_library(lens_path(project.lens)):
         return project, ()
-    lens, reported = open_lens(project.lens).lens, []
+    lens, chosen = open_lens(project.lens).lens, []
     changes: dict[str, object] = {}
     if "f_number" not in said:
         changes["f_number"] = stopped_down(lens.f_number)
-        reported.append(f"f/{changes['f_number']:g}")
+        chosen.append(f"f/{changes['f_number']:g}")
     if "coating" not in said:
         preset = plausible_preset(lens)
         changes["coating"] = Preset(name=preset)
-        reported.append(f"coating preset:{preset} (chosen, not known)")
+        chosen.append(f"coating preset:{preset} (chosen, not known)")
     iris = project.iris or lens.iris
     if not said & {"iris.blades", "iris.rounding", "iris.mask"} and _straight(iris):
         roughened = {"rounding": ROUNDING}
-        reported.append(f"blades rounded by {ROUNDING:g}")
+        chosen.append(f"blades rounded by {ROUNDING:g}")
         if "iris.roughness_um" not in said and iris.roughness_um == 0.0:
             roughened |= {"roughness_um": ROUGHNESS_UM, "roughness_length_um": ROUGHNESS_LENGTH_UM}
-            reported.append(f"edges rough by {ROUGHNESS_UM:g} um")
+            chosen.append(f"edges rough by {ROUGHNESS_UM:g} um")
         changes["iris"] = iris.replace(**roughened)
     if "lights" not in said and all(_point(light) for light in project.lights):
         sized = (light.replace(diameter_deg=LIGHT_DEG) for light in project.lights)
         # a light at the border of the front half-space stays a point
         changes["lights"] = tuple(wide if disc_fits(wide) else wide.replace(diameter_deg=0.0) for wide in sized)
         if changes["lights"] != project.lights:
-            reported.append(f"lights of {LIGHT_DEG:g} degrees")
+            chosen.append(f"lights of {LIGHT_DEG:g} degrees")
     filled: Project = project.replace(**changes) if changes else project
-    return filled, tuple(reported)
+    return filled, tuple(chosen)
 
 
 def stopped_down(f_number: float) -> float:

@@ -33,15 +33,15 @@ def outside_remarks(shots: Sequence[Shot], images: Sequence[DirectImage]) -> lis
         if np.isfinite(image.position_mm).all():
             lights.setdefault(shot.number, []).append((shot, image))
     places = {number: _outside_text(parts) for number, parts in lights.items()}
-    reported = [
+    remarks = [
         f"{'the light' if len(places) == 1 else f'light {number} (counted from 0)'} is {place} the picture"
         for number, place in places.items()
         if place
     ]
     return (
-        reported
-        if len(reported) <= MOST_LISTED
-        else [*reported[:MOST_LISTED], f"{len(reported) - MOST_LISTED} more lights are outside the picture"]
+        remarks
+        if len(remarks) <= MOST_LISTED
+        else [*remarks[:MOST_LISTED], f"{len(remarks) - MOST_LISTED} more lights are outside the picture"]
     )
 
 

@@ -184,8 +184,8 @@ def _assumed(lens: Lens, full: Lens, checked: bool) -> list[str]:
             continue
         efl = first_order(at_position(full, position)).efl
         if abs(efl / position.focal_length - 1.0) > 0.02:
-            reported = f"the focal length is {efl:.2f} mm, the file says {position.focal_length:g} mm"
-            remarks.append(f"position {position.name!r}: {reported}")
+            difference = f"the focal length is {efl:.2f} mm, the file says {position.focal_length:g} mm"
+            remarks.append(f"position {position.name!r}: {difference}")
     return remarks
 
 
