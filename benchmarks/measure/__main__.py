@@ -57,7 +57,7 @@ def prove(lens: str, folder: Path, given: argparse.Namespace) -> dict[str, Any]:
     merged = time.process_time()
     rough = find_ghosts(run_folder, run, report=tell)
     found = time.process_time()
-    model = fit_ghosts(run_folder, run, rough, rest=False, report=tell)
+    model = fit_ghosts(run_folder, run, rough, residual=False, report=tell)
     fitted = time.process_time()
     write_ghost_model(folder / f"model-{given.merge}.json", model)
     tell("fitted")

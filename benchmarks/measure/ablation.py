@@ -147,7 +147,7 @@ def case_of(setup: Setup, folder: Path, tell: Report) -> Case:
             odd.append((ideal_frame(still, truth, pose).info, truth, True))
     tell(f"{setup.lens}: photographed")
     run = run_of(setup, tuple(frame.info for frame in frames))
-    model = fit_ghosts(folder, run, find_ghosts(folder, run, most=MOST), again=0, rest=False)
+    model = fit_ghosts(folder, run, find_ghosts(folder, run, max_ghosts=MOST), extra_searches=0, residual=False)
     tell(f"{setup.lens}: {len(model.ghosts)} ghosts fitted")
     known = np.concatenate([frame.variance[np.isfinite(frame.variance)] for frame in frames])
     floor = float(np.sqrt(np.median(known)))

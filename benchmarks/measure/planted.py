@@ -105,7 +105,7 @@ def planted_time(count: int, constellations: int, tell: Callable[[str], None]) -
         done("planted")
         rough = find_ghosts(folder, run)
         done(f"found {len(rough.ghosts)}")
-        model = fit_ghosts(folder, run, rough, rest=False)
+        model = fit_ghosts(folder, run, rough, residual=False)
         done(f"fitted {len(model.ghosts)}")
         tracks = track_ghosts(folder, run, model)
         done("tracked")

@@ -302,7 +302,7 @@ def _fit(job: _Job, steps: Journal) -> None:
     joint = partial(fit_stage.fit_ghosts, settings=job.settings)
     way = joint if job.by == "joint" else partial(fit_as_walch, settings=job.walch)
     model = way(
-        job.folder, job.run, job.files.read(FOUND), every=job.every, rest=job.whole, threads=job.threads,
+        job.folder, job.run, job.files.read(FOUND), every=job.every, residual=job.whole, threads=job.threads,
         report=job.report, progress=job.progress, journal=steps,
     )  # fmt: skip
     job.files.write(MODEL, model)
@@ -358,7 +358,7 @@ def _compress_given(job: _Job) -> dict[str, object]:
 
 def _compress(job: _Job, steps: Journal) -> None:
     small = compress_stage.compress_ghosts(
-        job.folder, job.run, job.files.read(MODEL), job.tracks(), every=job.every, rest=job.whole,
+        job.folder, job.run, job.files.read(MODEL), job.tracks(), every=job.every, residual=job.whole,
         threads=job.threads, progress=job.progress, journal=steps, settings=job.settings,
     )  # fmt: skip
     job.files.write(COMPACT, small)

@@ -53,7 +53,7 @@ class Planted(NamedTuple):
         with pytest.MonkeyPatch.context() as patch:
             if not self.crescents:
                 patch.setattr(matching_pursuit, "_crescents", lambda *_: [])
-            rough = find_ghosts(folder, run, every=self.every, most=self.most)
+            rough = find_ghosts(folder, run, every=self.every, max_ghosts=self.most)
         assert len(rough.ghosts) == 2
         return rough
 
@@ -62,7 +62,7 @@ class Planted(NamedTuple):
         with pytest.MonkeyPatch.context() as patch:
             if not self.crescents:
                 patch.setattr(matching_pursuit, "_crescents", lambda *_: [])
-            return fit_ghosts(folder, run, rough, every=self.every, rest=False)
+            return fit_ghosts(folder, run, rough, every=self.every, residual=False)
 
 
 # in the large pictures the ghosts also stay inside when the camera is rolled
@@ -115,7 +115,7 @@ def test_skipped_frames_change_nothing(tmp_path):
 def test_ghosts_in_another_order_give_the_same_replay(fitted):
     planted, folder, run, rough, one = fitted
     # without the residual, which would compensate any difference
-    other = fit_ghosts(folder, run, rough.replace(ghosts=rough.ghosts[::-1]), every=planted.every, rest=False)
+    other = fit_ghosts(folder, run, rough.replace(ghosts=rough.ghosts[::-1]), every=planted.every, residual=False)
     # the fit sorts ghosts by brightness, so the order of all sums is the same
     assert other.model_dump_json() == one.model_dump_json()
     for angle in LOOKED_AT:
@@ -148,7 +148,7 @@ def test_order_and_start_values_of_a_crowd_do_not_change_the_replay(tmp_path):
     truth = [sum(render(one, view) for one in CROWD)[..., None] for view in views((), angles=LOOKED_AT)]
 
     def fitted(ghosts):
-        model = fit_ghosts(tmp_path, run, rough.replace(ghosts=ghosts), rest=False)
+        model = fit_ghosts(tmp_path, run, rough.replace(ghosts=ghosts), residual=False)
         assert len(model.ghosts) == len(CROWD)
         return [replay_model(model, angle)[0].pixels for angle in LOOKED_AT]
 

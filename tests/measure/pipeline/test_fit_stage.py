@@ -75,7 +75,7 @@ def test_a_ghost_that_goes_along_with_the_light_is_found(tmp_path):
     """It covers the light's surroundings at most constellations; treated as glow it would be found in pieces."""
     planted, size = rescaled(shape(80.0, 24.0, 0.5), 0.75), (180, 120)
     angles = np.linspace(2.0, LARGEST, 8)
-    model = find_ghosts(tmp_path, write(tmp_path, (planted,), angles=angles, size=size, focal=75.0), most=2)
+    model = find_ghosts(tmp_path, write(tmp_path, (planted,), angles=angles, size=size, focal=75.0), max_ghosts=2)
     assert len(model.ghosts) == 1
     # by its outline: a separate rim is equivalent to a pupil of that size
     for angle, view in zip(angles[2:], views((), angles=angles[2:], size=size), strict=True):
@@ -89,7 +89,7 @@ def test_a_search_in_halved_pictures_reports_of_the_captures_pixels(tmp_path, mo
     settings = MeasureSettings(detection=DetectionSettings(width_px=SIZE[0] // 2))
     pursued = searches(monkeypatch)
     reported: list[str] = []
-    found = find_ghosts(tmp_path, run, most=1, report=reported.append, settings=settings)
+    found = find_ghosts(tmp_path, run, max_ghosts=1, report=reported.append, settings=settings)
     assert [view.size_px for view in pursued[0]] == [(SIZE[0] // 2, SIZE[1] // 2)] * len(SMALL_ANGLES)
     speed, size = (float(re.search(f"^ghost 1: .*{word} (-?[0-9.]+) px", reported[0])[1]) for word in ("speed", "size"))
     # as planted, and as stored in the file
@@ -113,7 +113,7 @@ def test_a_fit_joins_what_was_found_in_pieces(tmp_path):
         ghosts=to_model(pieces, views((), angles=SMALL_ANGLES, size=size)),
     )  # fmt: skip
     reported = []
-    model = fit_ghosts(tmp_path, run, rough, settings=PLAIN, most=2, rest=False, report=reported.append)
+    model = fit_ghosts(tmp_path, run, rough, settings=PLAIN, max_ghosts=2, residual=False, report=reported.append)
     assert len(model.ghosts) == 1
     assert any("joined the ghost of speed" in line for line in reported)
 
@@ -130,7 +130,7 @@ def test_the_user_can_remove_a_ghost_and_add_one(folder, tmp_path, capsys):
 
 def test_a_fit_does_not_detect_a_removed_ghost_again(tmp_path):
     run = write_small(tmp_path, SMALL_GHOSTS[:2])
-    rough = find_ghosts(tmp_path, run, most=2, corrections=Corrections(remove=("2",)))
+    rough = find_ghosts(tmp_path, run, max_ghosts=2, corrections=Corrections(remove=("2",)))
     assert [ghost.name for ghost in rough.ghosts] == ["1"]
     assert [ghost.name for ghost in rough.removed] == ["2"]
     model = fit_ghosts(tmp_path, run, rough, settings=PLAIN)
@@ -154,11 +154,11 @@ def test_of_many_constellations_some_are_searched_and_all_fitted(tmp_path, monke
     # the hint is at a constellation that is not searched
     x = run.axis_px[0] + SPEED * np.tan(np.radians(angles[born])) / np.tan(np.radians(LARGEST))
     pointed = MarkedGhost(constellation_deg=float(angles[born]), centre_px=(x, run.axis_px[1]), radius_px=RADIUS)
-    rough = find_ghosts(tmp_path, run, most=1, corrections=Corrections(add=(pointed,)), settings=settings)
+    rough = find_ghosts(tmp_path, run, max_ghosts=1, corrections=Corrections(add=(pointed,)), settings=settings)
     assert [ghost.green.f[0] for ghost in rough.ghosts] == pytest.approx([SPEED], abs=1.0)
     # its range begins between the last searched constellation without it and the first with it
     assert angles[4] < rough.ghosts[0].visible_deg[0] < angles[7]
-    model = fit_ghosts(tmp_path, run, rough, settings=settings, most=2, rest=False)
+    model = fit_ghosts(tmp_path, run, rough, settings=settings, max_ghosts=2, residual=False)
     late, other = sorted(model.ghosts, key=lambda ghost: -ghost.green.f[0])
     assert angles[born - 1] < late.visible_deg[0] < angles[born]
     assert other.green.f[0] == pytest.approx(-55.0, abs=1.0)

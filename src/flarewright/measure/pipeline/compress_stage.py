@@ -21,7 +21,7 @@ from .track_stage import check_size, checked_ghosts
 
 
 def compress_ghosts(
-    folder: Path, run: MergedRun, model: GhostModel, tracks: Tracks, *, every: int = 1, rest: bool = True,
+    folder: Path, run: MergedRun, model: GhostModel, tracks: Tracks, *, every: int = 1, residual: bool = True,
     threads: int | None = None, progress: Progress = lambda _part, _words: None, journal: Journal | None = None,
     settings: MeasureSettings = MeasureSettings(),
 ) -> GhostModel:  # fmt: skip
@@ -37,7 +37,7 @@ def compress_ghosts(
         Tracks of the model's ghosts, from `track_ghosts`.
     every : int
         Step between the constellations used, as for `track_ghosts`.
-    rest : bool
+    residual : bool
         Whether to learn the residual beside the ghosts too. Without it the model has no sprites.
     threads : int, optional
     progress : callable
@@ -62,6 +62,6 @@ def compress_ghosts(
     )
     # free the memory before `with_residual` computes its own views
     del dim
-    if rest:
+    if residual:
         return with_residual(small, views, threads, journal)
     return small.replace(sprites=())

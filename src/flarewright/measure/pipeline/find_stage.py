@@ -30,7 +30,7 @@ from .settings import MeasureSettings
 
 
 def find_ghosts(
-    folder: Path, run: MergedRun, *, every: int = 1, corrections: Corrections | None = None, most: int = 60,
+    folder: Path, run: MergedRun, *, every: int = 1, corrections: Corrections | None = None, max_ghosts: int = 60,
     threads: int | None = None, report: Report = lambda _: None, progress: Progress = lambda _part, _words: None,
     journal: Journal | None = None, settings: MeasureSettings = MeasureSettings(),
 ) -> GhostModel:  # fmt: skip
@@ -44,7 +44,7 @@ def find_ghosts(
         Step between the constellations used; the others are not read.
     corrections : Corrections, optional
         Ghosts that the user adds or removes.
-    most : int
+    max_ghosts : int
         Largest number of ghosts.
     threads : int, optional
     report : callable
@@ -77,7 +77,7 @@ def find_ghosts(
         pointed = [candidate(each, views, run, looked=len(seen), factor=factor) for each in known.add]
         measured = [all_finite(view.variance) for view in small]
         found = pursue(
-            seen, measured, most=most, first=pointed, iris=iris, factor=factor, pool=pool, report=report,
+            seen, measured, most=max_ghosts, first=pointed, iris=iris, factor=factor, pool=pool, report=report,
             progress=progress, journal=journal, settings=detection,
         )  # fmt: skip
         found = solve_intensities(found, seen, pool=pool, settings=fit)

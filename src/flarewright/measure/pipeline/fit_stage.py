@@ -36,8 +36,8 @@ from .settings import MeasureSettings
 
 
 def fit_ghosts(
-    folder: Path, run: MergedRun, rough: GhostModel, *, every: int = 1, again: int = 1, most: int = 60,
-    rest: bool = True, threads: int | None = None, report: Report = lambda _: None,
+    folder: Path, run: MergedRun, rough: GhostModel, *, every: int = 1, extra_searches: int = 1, max_ghosts: int = 60,
+    residual: bool = True, threads: int | None = None, report: Report = lambda _: None,
     progress: Progress = lambda _part, _words: None, journal: Journal | None = None,
     settings: MeasureSettings = MeasureSettings(),
 ) -> GhostModel:  # fmt: skip
@@ -51,11 +51,11 @@ def fit_ghosts(
         From `find_ghosts`, optionally edited by the user.
     every : int
         Step between the constellations used, as for `find_ghosts`.
-    again : int
+    extra_searches : int
         Number of additional searches for ghosts in the residual.
-    most : int
+    max_ghosts : int
         Largest number of ghosts.
-    rest : bool
+    residual : bool
         Whether to learn the residual beside the ghosts too; `compress_ghosts` recomputes it.
     threads : int, optional
     report, progress, journal
@@ -80,16 +80,16 @@ def fit_ghosts(
         found = [found[k] for k in by_brightness(found)]
         dim = fit_and_subtract_glow(found, views, star_of(views, pool, settings.glow), pool, settings.glow)
         iris = iris_of(dim.star, settings.glow.star)
-        parts = iter(_parts(2 * again + 1, progress))
+        parts = iter(_parts(2 * extra_searches + 1, progress))
         settled = fit_all(
             found, dim.views, iris=iris, pool=pool, report=report, progress=next(parts), journal=journal,
             settings=settings.fit,
         )  # fmt: skip
-        for _ in range(again):
+        for _ in range(extra_searches):
             # with more ghosts known the glow is estimated better, and fainter ghosts can be detected
             dim = fit_and_subtract_glow(settled, views, dim.star, pool, settings.glow)
             more = _search_residual(
-                settled, views, dim.views, most - len(settled), iris, pool, report, next(parts), journal, settings
+                settled, views, dim.views, max_ghosts - len(settled), iris, pool, report, next(parts), journal, settings
             )
             settled += with_glow_unwanted(more, views, settings.glow.rejection)
             settled = _rejoined(settled, dim.views, pool, report, settings.detection)
@@ -107,7 +107,7 @@ def fit_ghosts(
         if not (left or ghost.unwanted)
     ]
     model = model_of_run(run, to_model(wanted, views), dim, views)
-    return with_residual(model, views, threads, journal) if rest else model
+    return with_residual(model, views, threads, journal) if residual else model
 
 
 def _parts(count: int, progress: Progress) -> list[Progress]:

@@ -39,9 +39,9 @@ _LENGTHS = 11
 
 
 def fit_as_walch(
-    folder: Path, run: MergedRun, rough: GhostModel, *, every: int = 1, rest: bool = True, threads: int | None = None,
-    report: Report = lambda _: None, progress: Progress = lambda _part, _words: None, journal: Journal | None = None,
-    settings: WalchSettings = WalchSettings(),
+    folder: Path, run: MergedRun, rough: GhostModel, *, every: int = 1, residual: bool = True,
+    threads: int | None = None, report: Report = lambda _: None, progress: Progress = lambda _part, _words: None,
+    journal: Journal | None = None, settings: WalchSettings = WalchSettings(),
 ) -> GhostModel:  # fmt: skip
     """Fit the detected ghosts with Walch's primitive and method.
 
@@ -53,7 +53,7 @@ def fit_as_walch(
         From `find_ghosts`: the start position of each ghost, and the other light over it.
     every : int
         Step between the constellations used, as for `find_ghosts`.
-    rest : bool
+    residual : bool
         Whether to learn the residual beside the ghosts too.
     threads : int, optional
     report, progress, journal
@@ -97,7 +97,7 @@ def fit_as_walch(
             progress(min(begin + _AT_ONCE, len(names)) / len(names), f"ghost {some[-1]}")
     remark = "fitted with Walch's primitive and by his gradient descent (2017), for comparison"
     model = bare.replace(ghosts=tuple(found), remarks=(*rough.remarks, remark))
-    return with_residual(model, views, threads, journal) if rest else model
+    return with_residual(model, views, threads, journal) if residual else model
 
 
 def _spots(model: GhostModel, view: View) -> tuple[Spot, ...]:
