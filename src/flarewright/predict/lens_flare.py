@@ -68,7 +68,7 @@ def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
     Raises
     ------
     FlarewrightError
-        As `settle`, and when drawing as `render`.
+        As `resolve_project`, and when drawing as `render`.
     """
     light = project.lights[0].replace(intensity=1.0, field_deg=(0.0, 0.0))
     prepared = project.replace(lights=(light,), output=Output(layers="passes", starburst=False))

@@ -75,7 +75,7 @@ class Cluster:
     ) -> Iterator[Done]:
         """Call a function for each item on the workers; parameters and errors as of `processes.work_off`.
 
-        An item whose worker is lost is repeated by another one, so a function must not mind to be called again.
+        An item whose worker is lost is repeated by another one, so a function can be called twice for an item.
         """
         if not items:
             return

@@ -42,6 +42,8 @@ def compress_ghosts(
     threads : int, optional
     progress : callable
         Called with the finished part (0 to 1) and a description.
+    journal : Journal, optional
+        As for `find_ghosts`.
     settings : MeasureSettings
 
     Raises

@@ -46,6 +46,8 @@ def with_detail(
         As photographed. Of the views of one image, the one nearest to its constellation counts.
     left : sequence of ndarray, shape (H, W, 3)
         Residual of the views beside all that the model draws; NaN where unknown.
+    threads : int, optional
+        None: all cores; the detail does not depend on it.
 
     Returns
     -------

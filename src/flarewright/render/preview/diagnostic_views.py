@@ -43,7 +43,7 @@ def working_ghosts(project: Project, *, grey: bool = False, unclipped: bool = Fa
     Raises
     ------
     FlarewrightError
-        As in `settle`.
+        As in `resolve_project`.
 
     Notes
     -----

@@ -71,7 +71,7 @@ def veiling_glare(project: Project, wavelength_nm: float, *, threads: int | None
     Raises
     ------
     FlarewrightError
-        As in `settle`.
+        As in `resolve_project`.
 
     Notes
     -----
