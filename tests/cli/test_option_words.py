@@ -55,12 +55,13 @@ def test_a_value_of_another_kind_is_reported_in_words(capsys, words, said):
         assert python not in err
 
 
-def test_every_output_refuses_an_empty_name(capsys):
+@pytest.mark.parametrize(("name", "said"), [("", "is empty"), ("a\0.exr", "has a null byte")])
+def test_every_output_refuses_what_is_no_name(capsys, name, said):
     commands = [name.split()[1:-1] for name, option in options(get_command(app)).items() if "--output" in option.opts]
     assert len(commands) > 20
     for words in commands:
-        assert run([*words, "-o", ""]) == 2
-        assert "the name of the output is empty" in capsys.readouterr().err, words
+        assert run([*words, "-o", name]) == 2
+        assert f"the name of the output {said}" in capsys.readouterr().err, words
 
 
 def test_each_option_of_a_project_sets_a_key_that_exists():

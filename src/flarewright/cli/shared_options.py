@@ -19,17 +19,19 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
 def output_name(text: str) -> str:
-    """Return the value of `-o`, unless it is empty: a path of no characters is the present folder.
+    """Return the value of `-o`; raise OutputError for an empty one, or for one that can be no name of a file.
 
-    Without this, `-o "$UNSET"` would fill that folder.
+    A path of no characters is the present folder, which `-o "$UNSET"` would fill.
     """
     if not text:
         raise OutputError("the name of the output is empty; give a file or a folder")
+    if "\0" in text:
+        raise OutputError("the name of the output has a null byte, which no file's name can have; give another name")
     return text
 
 
 def output_path(text: str) -> Path:
-    """Return the value of `-o` as a path, unless it is empty."""
+    """Return the value of `-o` as a path; errors as of `output_name`."""
     return Path(output_name(text))
 
 
