@@ -13,6 +13,7 @@ from flarewright.model import Camera
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.render.ghosts.traced_ghosts import draw_alone, find_final
 from flarewright.render.image.canvas import blank, merge
+from flarewright.render.image.sheet import Sheet
 from flarewright.render.scene.opening import make_opening
 from flarewright.render.scene.resolve import resolve_project
 from flarewright.render.scene.shots import make_shots
@@ -30,7 +31,8 @@ def test_a_coarse_sheet_keeps_flux_and_colour(level, error):
         light = []
         for detail in (0, 2):
             canvas = blank(shot.size_px)
-            draw_alone([replace(item, detail=detail)], settled.project.quality, canvas, level=level * bool(detail))
+            own, quality = [replace(item, detail=detail)], settled.project.quality
+            draw_alone(own, quality, canvas, Sheet(), level=level * bool(detail))
             light.append(merge(canvas.planes, canvas.size_px).sum(axis=(0, 1), dtype=np.float64))
         fine, coarse = light
         np.testing.assert_allclose(coarse, fine, atol=error * fine.max(), err_msg=path.name)

@@ -13,7 +13,8 @@ from flarewright.optics.colour.spectrum import band_weights
 from flarewright.optics.diffraction.fraunhofer import BladeWings, FanWings, pupil_pattern, spike_profile
 from flarewright.optics.pupil.iris import blade_edges, iris_outline
 from flarewright.render.render import render
-from flarewright.render.starburst.pattern import BAND, starburst_layer
+from flarewright.render.starburst.bands import BAND
+from flarewright.render.starburst.pattern import starburst_layer
 
 WHITE_NM = np.arange(380.0, 781.0, 5.0)
 WHITE = band_weights(D65(), WHITE_NM, "rec709")

@@ -60,6 +60,8 @@ CHANNELS = "RGB"
 # beginnings of the names of layers of single ghosts; those of a shot have no dots
 _SINGLE = ("ghost.", "ghost_")
 
+# rows that are rounded to half floats together
+_BAND = 64
 # with less space left on the disk than this, bytes, a written file is read again
 _SPARE = 1_000_000
 # the library prints errors to stdout; redirecting stdout affects all threads
@@ -422,12 +424,17 @@ def _over_picture(layer: Layer, size_px: tuple[int, int]) -> tuple[Pixels, tuple
 
 def _stored(pixels: Pixels, scale: float, half: bool) -> NDArray[Any]:
     """Return the pixels as stored: scaled, as half floats if they are in range."""
-    if scale != 1.0:
-        pixels = pixels * np.float32(scale)
+    factor = np.float32(scale)
     if not half:
-        return np.ascontiguousarray(pixels)
-    rounded = rounded_to_half(pixels)
-    return rounded if np.any(np.abs(rounded) > HALF_MAX) else rounded.astype(np.float16)
+        return np.ascontiguousarray(pixels if scale == 1.0 else pixels * factor)
+    stored: NDArray[Any] = np.empty(pixels.shape, np.float16)
+    # in bands of rows: a few copies of a whole picture cost more time to clear than to fill
+    for top in range(0, len(pixels), _BAND):
+        rounded = rounded_to_half(pixels[top : top + _BAND] * factor)
+        if np.any(np.abs(rounded) > HALF_MAX):
+            return rounded_to_half(pixels * factor)
+        stored[top : top + _BAND] = rounded
+    return stored
 
 
 def _unscaled(pixels: Pixels, scale: float) -> Pixels:

@@ -22,6 +22,14 @@ _FLOATS = 3 * BLOCK
 _PREFETCH_ROWS = 3
 
 
+def plane_shape(width, height):
+    """Return the shape of a picture of width x height pixels in blocks, (H, ceil(W / BLOCK), 3, BLOCK).
+
+    The last block of a row may have pixels beyond the width: drawn on, but dropped by `to_pixels`.
+    """
+    return height, -(-width // BLOCK), 3, BLOCK
+
+
 def blank_plane(width, height):
     """Return a black picture in the block form of `fill_polygon`.
 
@@ -32,10 +40,9 @@ def blank_plane(width, height):
 
     Returns
     -------
-    ndarray, shape (H, ceil(W / BLOCK), 3, BLOCK), float32
-        The last block of a row may have pixels beyond the width: drawn on, but dropped by `to_pixels`.
+    ndarray of float32, of `plane_shape`
     """
-    return np.zeros((height, -(-width // BLOCK), 3, BLOCK), dtype=np.float32)
+    return np.zeros(plane_shape(width, height), dtype=np.float32)
 
 
 def to_pixels(plane, width):

@@ -16,7 +16,7 @@ from ..image.canvas import lit_window
 _Light = TypeVar("_Light", Pixels, Floats)
 
 # kernels of more taps are applied by a Fourier transform
-MOST_TAPS = 300
+MOST_TAPS = 600
 
 
 def blur_by_extent(picture: NDArray[np.floating], kernel: Floats) -> Floats:
@@ -32,17 +32,10 @@ def blur_by_extent(picture: NDArray[np.floating], kernel: Floats) -> Floats:
     ndarray, shape (H, W, C)
         Light that lands outside is lost.
     """
-    height, width = picture.shape[:2]
-    reach = [side // 2 for side in kernel.shape]
-    rows, columns = fast_size(height + 2 * reach[0]), fast_size(width + 2 * reach[1])
-    transfer = np.fft.rfft2(kernel, (rows, columns))
-    out = np.empty(picture.shape)
-    for c in range(picture.shape[2]):
-        wide = np.fft.irfft2(
-            np.fft.rfft2(picture[..., c].astype(np.float64), (rows, columns)) * transfer, (rows, columns)
-        )
-        out[..., c] = wide[reach[0] : reach[0] + height, reach[1] : reach[1] + width]
-    return out
+    rows, columns = (
+        slice(side // 2, side // 2 + count) for side, count in zip(kernel.shape, picture.shape, strict=False)
+    )
+    return _convolved(picture, kernel, (rows, columns), np.empty(picture.shape))
 
 
 def spread_within(picture: NDArray[np.floating], kernel: Floats) -> Floats:
@@ -57,17 +50,25 @@ def spread_within(picture: NDArray[np.floating], kernel: Floats) -> Floats:
     -------
     ndarray, shape (H, W, C)
     """
-    lit, seen, corner = _landing(picture, kernel)
-    rows, columns = picture.shape[0] - kernel.shape[0] + 1, picture.shape[1] - kernel.shape[1] + 1
-    return placed(_transformed(picture[lit], kernel, seen), corner, (columns, rows))
+    x0, y0, x1, y1 = lit_window(picture)
+    part, corner, (rows, columns) = _landing((x1 - x0, y1 - y0), (x0, y0), picture.shape[1::-1], kernel)
+    light = np.empty((rows, columns, picture.shape[2]))
+    inner = picture.shape[1] - kernel.shape[1] + 1, picture.shape[0] - kernel.shape[0] + 1
+    return placed(_convolved(picture[y0:y1, x0:x1], kernel, part, light), corner, inner)
 
 
-def spread_window(picture: Pixels, kernel: Floats) -> tuple[Pixels, tuple[int, int]]:
-    """As `spread_within`, but return only the part of the result that may hold light.
+def spread_window(
+    light: Pixels, corner: tuple[int, int], size_px: tuple[int, int], kernel: Floats
+) -> tuple[Pixels, tuple[int, int]]:
+    """As `spread_within`, but take the lit window of a picture, and return only what may hold light.
 
     Parameters
     ----------
-    picture : ndarray, shape (H + 2 a, W + 2 b, C), float32
+    light : ndarray, shape (h, w, C), float32
+    corner : tuple of int
+        Column and row of its first pixel in the picture.
+    size_px : tuple of int
+        Width and height of the picture, W + 2 b and H + 2 a.
     kernel : ndarray, shape (2 a + 1, 2 b + 1)
 
     Returns
@@ -77,14 +78,12 @@ def spread_window(picture: Pixels, kernel: Floats) -> tuple[Pixels, tuple[int, i
     corner : tuple of int
         Column and row of its first pixel.
     """
-    lit, seen, corner = _landing(picture, kernel)
+    part, landed, shape = _landing(light.shape[1::-1], corner, size_px, kernel)
+    out = np.zeros((*shape, light.shape[2]), dtype=np.float32)
     if np.count_nonzero(kernel) > MOST_TAPS:
-        return _transformed(picture[lit], kernel, seen).astype(np.float32), corner
-    rows, columns = seen
-    light = np.zeros((rows.stop - rows.start, columns.stop - columns.start, picture.shape[2]), dtype=np.float32)
-    window = np.ascontiguousarray(picture[lit], dtype=np.float32)
-    spread_taps(window, kernel.astype(np.float32), rows.start, columns.start, light)
-    return light, corner
+        return _convolved(light, kernel, part, out), landed
+    spread_taps(np.ascontiguousarray(light), kernel.astype(np.float32), part[0].start, part[1].start, out)
+    return out, landed
 
 
 def placed(light: _Light, corner: tuple[int, int], size_px: tuple[int, int]) -> _Light:
@@ -96,32 +95,39 @@ def placed(light: _Light, corner: tuple[int, int], size_px: tuple[int, int]) -> 
 
 
 def _landing(
-    picture: NDArray[np.floating], kernel: Floats
-) -> tuple[tuple[slice, slice], tuple[slice, slice], tuple[int, int]]:
-    """Find where the light of a picture lands when it is spread.
+    count: tuple[int, int], corner: tuple[int, int], size_px: tuple[int, int], kernel: Floats
+) -> tuple[tuple[slice, slice], tuple[int, int], tuple[int, int]]:
+    """Find where light lands when it is spread: columns and rows of a window and of its corner in a picture.
 
-    Returns rows and columns of the picture with light; the rows and columns of their whole convolution that lie within
-    the picture without its border, empty if there are none; and the column and row there of the first of these.
+    Returns the rows and columns of the window's whole convolution that lie within the picture without its border, empty
+    if there are none; the column and row there of the first of these; and the number of rows and of columns.
     """
-    x0, y0, x1, y1 = lit_window(picture)
-    seen, corner = [], []
-    for start, end, side, taps in zip((y0, x0), (y1, x1), picture.shape, kernel.shape, strict=False):
+    parts, landed = [], []
+    for lit, start, side, taps in zip(count, corner, size_px, kernel.shape[::-1], strict=True):
         # the convolution begins at this row or column of the result
         first = start - taps + 1
         low = max(first, 0)
-        seen.append(slice(low - first, max(min(end, side - taps + 1), low) - first))
-        corner.append(low)
-    if x1 <= x0 or any(part.stop <= part.start for part in seen):
-        seen, corner = [slice(0, 0)] * 2, [0, 0]
-    return (slice(y0, y1), slice(x0, x1)), (seen[0], seen[1]), (corner[1], corner[0])
+        parts.append(slice(low - first, max(min(start + lit, side - taps + 1), low) - first))
+        landed.append(low)
+    if 0 in count or any(part.stop <= part.start for part in parts):
+        parts, landed = [slice(0, 0)] * 2, [0, 0]
+    rows, columns = parts[1], parts[0]
+    return (rows, columns), (landed[0], landed[1]), (rows.stop - rows.start, columns.stop - columns.start)
 
 
-def _transformed(window: NDArray[np.floating], kernel: Floats, seen: tuple[slice, slice]) -> Floats:
-    """Return a part of the whole convolution of a window, by FFT."""
-    if seen[0].stop <= seen[0].start:
-        return np.zeros((0, 0, window.shape[2]))
-    around = [(side // 2,) * 2 for side in kernel.shape]
-    return blur_by_extent(np.pad(window, (*around, (0, 0))), kernel)[seen]
+def _convolved(window: NDArray[np.floating], kernel: Floats, part: tuple[slice, slice], out: _Light) -> _Light:
+    """Fill `out` with these rows and columns of the whole convolution of a window, by FFT."""
+    if not out.size:
+        return out
+    rows, columns = (fast_size(side + taps - 1) for side, taps in zip(window.shape, kernel.shape, strict=False))
+    transfer = np.fft.rfft2(kernel, (rows, columns))
+    for c in range(window.shape[2]):
+        waves = np.fft.rfft2(window[..., c].astype(np.float64), (rows, columns))
+        waves *= transfer
+        # only these rows are transformed back along themselves
+        kept = np.fft.ifft(waves, axis=0)[part[0]]
+        out[..., c] = np.fft.irfft(kept, columns, axis=1)[:, part[1]]
+    return out
 
 
 def joined_parts(one: Floats, other: Floats) -> Floats:

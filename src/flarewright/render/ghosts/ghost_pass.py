@@ -24,6 +24,7 @@ from ...typing import Floats, Mask, Pixels, Progress
 from ..image.canvas import DETAILS, Plane, blank, lit_window, merge, to_layer
 from ..image.ghost_ranking import GhostRanking, luminance_of
 from ..image.partial_picture import PartialPicture, steps_of
+from ..image.sheet import Sheet
 from ..scene.area_lights import DRAFT_ROUNDING, halvings, motion, spread_border
 from ..scene.art_rules import PLAIN, PathArt
 from ..scene.memory_check import check_memory, spare_bytes
@@ -244,6 +245,7 @@ def _final(
         alike: dict[object, list[FinalPass]] = {}
         # rings in a separate layer are judged without the other ghosts
         seen_in = around if alone.isdisjoint(group) else None
+        apart = partial(draw_alone, quality=quality, canvas=canvas, sheet=Sheet(), around=seen_in, costs=costs)
         for k in group:
             if meter.cancelled.is_set():
                 break
@@ -251,7 +253,7 @@ def _final(
                 if item.source is not None and k not in alone:
                     continue
                 if item.region.seen_flux > 0.0 and item.art.ramps:
-                    steps.step(partial(draw_alone, [item], quality, canvas, around=seen_in, costs=costs), whole=False)
+                    steps.step(partial(apart, [item]), whole=False)
                 elif item.region.seen_flux > 0.0 and item.alone:
                     alike.setdefault(item.alone, []).append(item)
                 elif item.region.seen_flux > 0.0:
@@ -260,15 +262,15 @@ def _final(
                     steps.step(partial(draw_final, item, quality, canvas, visibility, around=seen_in, costs=costs))
             meter.step(f"ghost {name_of[k]}")
         for together in alike.values():
-            steps.step(partial(draw_alone, together, quality, canvas, around=seen_in, costs=costs), whole=False)
+            steps.step(partial(apart, together), whole=False)
         steps.end()
         return canvas.planes
 
     def draw_spread(number: int) -> list[Plane | None]:
-        canvas = blank(shots[0].size_px)
+        canvas, sheet = blank(shots[0].size_px), Sheet()
         steps = steps_of(kept, f"spread-{number}", canvas, meter.cancelled)
         for group in wide[number::_MOST_CHUNKS]:
-            work = partial(draw_alone, group, quality, canvas, around=around, level=seen_level, costs=costs)
+            work = partial(draw_alone, group, quality, canvas, sheet, around=around, level=seen_level, costs=costs)
             steps.step(work, whole=False)
         steps.end()
         return canvas.planes

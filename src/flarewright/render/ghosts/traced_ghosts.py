@@ -29,7 +29,8 @@ from ...optics.rays.pupil_region import Region, find_region, measure_region, wid
 from ...optics.rays.torn_cells import cut_failed_triangles
 from ...optics.scattering.sensor_grating import GratingOrder, grating_orders
 from ...typing import Floats
-from ..image.canvas import DETAIL_CONTRAST, DETAILS, Canvas, blank, merge
+from ..image.canvas import DETAIL_CONTRAST, DETAILS, Canvas
+from ..image.sheet import Sheet
 from ..scene.area_lights import NARROW_PX, halvings, motion, spread_border
 from ..scene.art_rules import PLAIN, Frame, PathArt
 from ..scene.path_color import traced_spectrum, visible_rays
@@ -397,6 +398,7 @@ def draw_alone(
     items: Sequence[FinalPass],
     quality: Quality,
     canvas: Canvas,
+    sheet: Sheet,
     stop: Event | None = None,
     around: Surroundings | None = None,
     level: float = 0.0,
@@ -412,6 +414,8 @@ def draw_alone(
     quality : Quality
     canvas : Canvas
         Added to.
+    sheet : Sheet
+        Memory for the separate plane.
     stop : Event, optional
         Set to stop between two wavelengths.
     around : Surroundings, optional
@@ -429,26 +433,22 @@ def draw_alone(
     if kernel is not None:
         mx, my = mx + kernel.shape[1] // 2, my + kernel.shape[0] // 2
     width, height = canvas.size(detail)
-    sheet = blank((width + 2 * mx, height + 2 * my))
+    apart = sheet.canvas((width + 2 * mx, height + 2 * my))
     beside = None if around is None else around.moved((mx, my), detail)
     small = None if source is None else mapped(source, 0.5**detail * np.eye(2))
     for item in items:
         shifted = item.to_pixels / 2.0**detail + np.array([mx, my, 0.0, 0.0])
         own_item = replace(item, to_pixels=shifted, source=small, pictured=item.to_pixels)
         visible = edge_contrast(item, level)
-        draw_final(own_item, quality, sheet, visible, stop=stop, around=beside, detail=0, costs=costs)
-    # separate planes hold blocks of float32
-    pixels, corner = merge(sheet.planes, sheet.size_px).astype(np.float32, copy=False), (0, 0)
-    # as large as the picture, and another copy follows
-    del sheet
+        draw_final(own_item, quality, apart, visible, stop=stop, around=beside, detail=0, costs=costs)
+    light, corner = sheet.lift(apart)
     if kernel is not None:
-        pixels, corner = spread_window(pixels, kernel)
+        light, corner = spread_window(light, corner, apart.size_px, kernel)
     if not art.alone:
-        canvas.add(pixels, detail, corner)
+        canvas.add(light, detail, corner)
         return
-    if kernel is not None:
-        # filters take the picture with its margin
-        pixels = placed(pixels, corner, (width + 2 * art_margin[0], height + 2 * art_margin[1]))
+    # filters take the picture with its margin
+    pixels = placed(light, corner, (width + 2 * art_margin[0], height + 2 * art_margin[1]))
     canvas.add(filtered_ghost(pixels, art, frame, items[0].to_pixels / 2.0**detail, own), detail)
 
 

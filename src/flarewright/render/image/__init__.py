@@ -3,6 +3,7 @@
 Modules:
 
 - `canvas`: `Canvas`, `merge`, `to_layer`, `lit_window`: planes of flux at several resolutions
+- `sheet`: `Sheet`: memory on which ghosts are drawn apart from the picture
 - `partial_picture`: `PartialPicture`, `KeptSteps`: canvases in files, from which an interrupted render resumes
 - `compose`: `beauty`, `add_layer`: the sum of layers
 - `ghost_ranking`: `GhostRanking`, `ghost_matte`: the brightest ghosts of each pixel

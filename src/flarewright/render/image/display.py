@@ -202,10 +202,10 @@ def layers_exposure(layers: Sequence[Layer], colorspace: Colorspace = "rec709") 
 
 def _brightest(rgb_linear: Pixels, colorspace: Colorspace) -> Floats:
     """Return the largest channel of each pixel in Rec.709."""
-    light = np.asarray(rgb_linear, np.float64)
+    light: NDArray[np.floating] = rgb_linear
     if colorspace == "acescg":
-        light = light @ ACESCG_TO_REC709.T
-    return brightest_channel(light)
+        light = np.asarray(rgb_linear, np.float64) @ ACESCG_TO_REC709.T
+    return np.asarray(brightest_channel(light), np.float64)
 
 
 def srgb_oetf(light: Floats) -> Floats:

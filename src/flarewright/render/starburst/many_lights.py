@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from ...kernels.diffraction import wings as kernel
 from ...optics.diffraction.fraunhofer import BladeWings, FanWings, Pattern, SpikeProfile, spike_profile
 from ...typing import Floats, Indices, Pixels
-from .pattern import BAND, NEAR_PIXELS, Painter, painter_of
-from .translated_wings import add_moved_wings, in_threads
+from .bands import BAND, in_threads
+from .pattern import NEAR_PIXELS, Painter, painter_of
+from .translated_wings import add_moved_wings
 
 # largest number of cells of the fine pattern per pixel, in final and draft quality, and along a side
 PIXEL_CELLS, DRAFT_PIXEL_CELLS, SIDE_CELLS = 8, 4, 1280

@@ -8,9 +8,7 @@ of the blades continue it in closed form over the whole picture.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,14 +20,12 @@ from flarewright.optics.diffraction.fraunhofer import BladeWings, FanWings, Patt
 from flarewright.optics.pupil.dirt import VeilTerm
 
 from ...typing import Floats, Pixels
+from .bands import BAND, in_threads
 
 NEAR_PIXELS = 8
 """Pixels this close to the centre are split NEAR_SPLIT times per side: blend and wings change within a pixel there."""
 
 NEAR_SPLIT = 8
-
-BAND = 64
-"""Rows of pixels that a thread blends at a time."""
 
 LEAST_CORE = 1.0
 """Least radius of the core, before the blend, in parts of a pixel: with less the blend loses flux."""
@@ -39,6 +35,9 @@ KNOTS = 1200
 
 MOST_PARTS = 100_000_000
 """Largest number of parts of the pixels near the centre, limited by memory."""
+
+# adds the wings to the rows at these heights
+_Blend = Callable[[Floats, Pixels | Floats], None]
 
 
 def starburst_layer(
@@ -177,44 +176,34 @@ class Painter:
         """Write the irradiance of every pixel between the edges into `out`, which must hold zeros."""
         self._core(x_edges, y_edges, pixel_mm, out)
         x, y = 0.5 * (x_edges[1:] + x_edges[:-1]), 0.5 * (y_edges[1:] + y_edges[:-1])
-        wings = self.pattern.wings
-        if isinstance(wings, FanWings):
-            self._fans(wings, x, y, pixel_mm, out, threads)
-        else:
-            spread = None if self.pattern.rough is None else out.copy()
-            self._blades(wings, x, y, pixel_mm, out, threads)
-            if self.pattern.rough is not None and spread is not None:
-                self._fans(self.pattern.rough, x, y, pixel_mm, spread, threads)
-                out += (1.0 - self._coherence(np.hypot(x, y[:, None]))) * (spread - out)
-        for term in self.pattern.veil:
-            self._add_veil(term, x, y, out)
+        if not (x.size and y.size):
+            return
+        farthest, wings = math.hypot(np.abs(x).max(), np.abs(y).max()), self.pattern.wings
+        blend = (
+            self._fans(wings, x, pixel_mm)
+            if isinstance(wings, FanWings)
+            else self._blades(wings, x, pixel_mm, farthest)
+        )
+        veils = [self._veil(term, farthest) for term in self.pattern.veil]
 
-    def _fans(
-        self,
-        wings: FanWings,
-        x: Floats,
-        y: Floats,
-        pixel_mm: tuple[float, float],
-        out: Pixels | Floats,
-        threads: int | None,
-    ) -> None:
+        def paint_band(first: int) -> None:
+            rows, band = y[first : first + BAND], out[first : first + BAND]
+            blend(rows, band)
+            for veil in veils:
+                band += veil(x, rows[:, None])
+
+        in_threads(paint_band, range(0, len(y), BAND), threads)
+
+    def _fans(self, wings: FanWings, x: Floats, pixel_mm: tuple[float, float]) -> _Blend:
         colour = 2.0 * self.f_number * (self.wave * 1e-6) @ self.weights
         cumulative = np.concatenate([[0.0], np.cumsum(wings.angular) / len(wings.angular)])
 
         def blend(y: Floats, out: Pixels | Floats) -> None:
             blend_fan_wings(x, y, np.array(pixel_mm), cumulative, colour, self.inner, self.outer, out)
 
-        _in_bands(blend, y, out, threads)
+        return blend
 
-    def _blades(
-        self,
-        wings: BladeWings,
-        x: Floats,
-        y: Floats,
-        pixel_mm: tuple[float, float],
-        out: Pixels | Floats,
-        threads: int | None,
-    ) -> None:
+    def _blades(self, wings: BladeWings, x: Floats, pixel_mm: tuple[float, float], farthest: float) -> _Blend:
         profile = spike_profile(wings, self.wave, self.weights, self.f_number, pixel_mm)
         spikes = SpikeTables(
             wings.angle, wings.half_fan, profile.cumulative, profile.density, profile.half_total, profile.tail,
@@ -224,16 +213,33 @@ class Painter:
         def blend(y: Floats, out: Pixels | Floats) -> None:
             blend_blade_wings(x, y, np.array(pixel_mm), spikes, self.inner, self.outer, out)
 
-        _in_bands(blend, y, out, threads)
+        if self.pattern.rough is None:
+            return blend
+        spread, kept = self._fans(self.pattern.rough, x, pixel_mm), self._coherence(farthest)
 
-    def _radial(self, r: Floats, value: Callable[[Floats], Floats], least: float) -> Floats:
-        """Sum a function of s = r / (2 N lambda) over wavelengths, by a table in ln r; shape of r plus 3 channels."""
-        knots = np.geomspace(max(least, 1e-9), max(float(r.max()), 2.0 * least), KNOTS)
+        def blend_rough(y: Floats, out: Pixels | Floats) -> None:
+            smooth = out.copy()
+            spread(y, smooth)
+            blend(y, out)
+            out += (1.0 - kept(np.hypot(x, y[:, None]))) * (smooth - out)
+
+        return blend_rough
+
+    def _by_radius(self, value: Callable[[Floats], Floats], farthest: float) -> Callable[[Floats], Floats]:
+        """Return the sum over wavelengths of a function of s = r / (2 N lambda): of any shape of r, with 3 channels.
+
+        It is read from a table in ln r that ends at `farthest`, mm.
+        """
+        least = self.inner
+        knots = np.geomspace(max(least, 1e-9), max(farthest, 2.0 * least), KNOTS)
         table = np.einsum("km,mc->kc", value(knots[:, None] / self._scale), self.weights)
-        at = np.log(np.maximum(r, least))
-        # multiplied by r^2 the table is nearly constant
-        found = [np.interp(at, np.log(knots), column * knots**2) for column in table.T]
-        summed: Floats = np.stack(found, axis=-1) / np.maximum(r, least)[..., None] ** 2
+
+        def summed(r: Floats) -> Floats:
+            at = np.log(np.maximum(r, least))
+            # multiplied by r^2 the table is nearly constant
+            found = [np.interp(at, np.log(knots), column * knots**2) for column in table.T]
+            return np.asarray(np.stack(found, axis=-1) / np.maximum(r, least)[..., None] ** 2)
+
         return summed
 
     @property
@@ -241,33 +247,36 @@ class Painter:
         """Millimetres on the sensor per unit of s, for each wavelength."""
         return 2.0 * self.f_number * self.wave * 1e-6
 
-    def _coherence(self, r: Floats) -> Floats:
-        """Return the part of a spike that rough blades keep, by radius and channel."""
+    def _coherence(self, farthest: float) -> Callable[[Floats], Floats]:
+        """Return the part of a spike that rough blades keep, a function of the radius, for each channel."""
         sigma = self.pattern.roughness
 
         def spike(s: Floats) -> Floats:
             return self._scale * np.exp(-((2.0 * math.pi * sigma * s) ** 2))
 
+        left = self._by_radius(spike, farthest)
         # weights of a channel can cancel, so divide by the same sum without roughness
-        left = self._radial(r, spike, self.inner)
         whole = self._scale @ self.weights
-        return np.clip(left / np.where(whole == 0.0, 1.0, whole), 0.0, 1.0)
+        return lambda r: np.clip(left(r) / np.where(whole == 0.0, 1.0, whole), 0.0, 1.0)
 
-    def _add_veil(self, term: VeilTerm, x: Floats, y: Floats, out: Pixels | Floats) -> None:
-        r = np.hypot(x, y[:, None])
-        t = np.clip((r - self.inner) / (self.outer - self.inner), 0.0, 1.0)
-        window = t**3 * (t * (6.0 * t - 15.0) + 10.0)
-
+    def _veil(self, term: VeilTerm, farthest: float) -> Callable[[Floats, Floats], Floats]:
         def value(s: Floats) -> Floats:
             slope = np.log(term.radial[-1] / term.radial[-2]) / np.log(term.s[-1] / term.s[-2])
             inside = np.interp(s, term.s, term.radial)
             beyond = term.radial[-1] * (s / term.s[-1]) ** slope
             return np.where(s <= term.s[-1], inside, beyond) / self._scale**2
 
-        count = len(term.angular)
-        turns = np.arctan2(y[:, None], x) / math.pi * count
-        share = np.interp(turns, np.arange(count), term.angular, period=count) if count > 1 else term.angular[0]
-        out += (window * share)[..., None] * self._radial(r, value, self.inner)
+        light, count = self._by_radius(value, farthest), len(term.angular)
+
+        def veil(x: Floats, y: Floats) -> Floats:
+            r = np.hypot(x, y)
+            t = np.clip((r - self.inner) / (self.outer - self.inner), 0.0, 1.0)
+            window = t**3 * (t * (6.0 * t - 15.0) + 10.0)
+            turns = np.arctan2(y, x) / math.pi * count
+            share = np.interp(turns, np.arange(count), term.angular, period=count) if count > 1 else term.angular[0]
+            return np.asarray((window * share)[..., None] * light(r))
+
+        return veil
 
     def _core(self, x_edges: Floats, y_edges: Floats, pixel_mm: tuple[float, float], out: Pixels | Floats) -> None:
         """Add the flux of the Fourier pattern inside the square around the outer radius."""
@@ -280,19 +289,6 @@ class Painter:
         knots_per_mm = self.pattern.knots_per_s / (2.0 * self.f_number * self.wave * 1e-6)
         deposit_core(self.pattern.table, knots_per_mm, self.weights, x_edges[j0 : j1 + 1], y_edges[i0 : i1 + 1], flux)
         out[i0:i1, j0:j1] = flux / (pixel_mm[0] * pixel_mm[1])
-
-
-def _in_bands(
-    blend: Callable[[Floats, Pixels | Floats], None], y: Floats, out: Pixels | Floats, threads: int | None
-) -> None:
-    """Blend rows of pixels, which are independent, in bands on several threads."""
-    if threads == 1 or len(y) <= BAND:
-        blend(y, out)
-        return
-    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        starts = range(0, len(y), BAND)
-        for _ in pool.map(lambda start: blend(y[start : start + BAND], out[start : start + BAND]), starts):
-            pass
 
 
 def _near(centre: float, size: int) -> tuple[int, int]:

@@ -18,7 +18,7 @@ from ...optics.diffraction.fraunhofer import BladeWings, Pattern, Soil, pupil_pa
 from ...optics.lens.paths import direct_path
 from ...optics.pupil.polygon import mapped, points
 from ...typing import Floats
-from ..ghosts.extent_blur import blur_by_extent, extent_coverage, joined_parts
+from ..ghosts.extent_blur import extent_coverage, joined_parts, spread_window
 from ..scene.area_lights import motion
 from ..scene.direct_image import PUPIL_SPAN, DirectImage, defocus_mm, traced_pupil, traced_spot
 from ..scene.path_color import direct_flux
@@ -223,7 +223,7 @@ def _one_light(
         picture = drawn if picture is None else picture + drawn
     if picture is None or kernel is None:
         return picture
-    return blur_by_extent(picture, kernel)[margin[1] : margin[1] + height, margin[0] : margin[0] + width]
+    return spread_window(picture.astype(np.float32, copy=False), (0, 0), size, kernel)[0]
 
 
 def _flux(shot: Shot, image: DirectImage) -> float:

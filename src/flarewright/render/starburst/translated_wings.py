@@ -7,15 +7,13 @@ beside spikes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ...kernels.diffraction.wings import add_moved
 from ...typing import Floats, Indices, Pixels
-from .pattern import BAND, Painter
+from .bands import BAND, in_threads
+from .pattern import Painter
 
 # a light farther outside the picture, in parts of its side, would make the atlas large and is drawn separately
 FAR_PART = 0.5
@@ -23,13 +21,6 @@ FAR_PART = 0.5
 PARTS, DRAFT_PARTS = 2, 1
 # largest size of the atlas in memory; a larger one is drawn in pieces
 ATLAS_BYTES = 100_000_000
-
-
-def in_threads(work: Callable[[int], None], items: Iterable[int], threads: int | None) -> None:
-    """Apply a function to every item in several threads."""
-    with ThreadPoolExecutor(threads) as pool:
-        for _ in pool.map(work, items):
-            pass
 
 
 def add_moved_wings(
