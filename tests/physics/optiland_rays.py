@@ -57,6 +57,11 @@ def form(row):
         coefficients[3 : 3 + 2 * len(row["asphere"]) : 2] = row["asphere"]
         words = {"surface_type": "odd_asphere", "radius": radius, "conic": row["conic"], **exact}
         return {**words, "coefficients": coefficients, **place}
+    if row.get("torus"):
+        across = np.inf if row["curvature_x"] == 0.0 else 1.0 / row["curvature_x"]
+        words = {"surface_type": "toroidal", "radius_x": across, "radius_y": radius, "conic": row["conic"], **exact}
+        # its first coefficient belongs to y^2
+        return {**words, "toroidal_coeffs_poly_y": [0.0, *row["asphere"]], **place}
     if row.get("asphere"):
         # optiland's first coefficient belongs to r^2
         coefficients = [0.0, *row["asphere"]]

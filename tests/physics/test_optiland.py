@@ -126,6 +126,11 @@ SHAPES: dict[str, dict[int, dict[str, Any]]] = {
         3: {"odd_asphere": (-2e-4, 1e-6)},
     },
     "cylinders": {0: {"curvature_x": 0.0}, 6: {"curvature": 0.0, "curvature_x": -0.05, "conic_x": -0.4}},
+    "tori": {
+        0: {"curvature_x": 0.01, "conic": -0.6, "torus": True, "asphere": (3e-6, -2e-8)},
+        3: {"curvature": 0.0, "curvature_x": 0.02, "torus": True},
+        6: {"curvature_x": -0.03, "torus": True, "decentre": (0.2, -0.1)},
+    },
     "decentred": {0: {"decentre": (0.4, -0.3)}, 5: {"decentre": (-0.2, 0.1)}},
     "tilted about x": {2: {"tilt_deg": (1.5, 0.0)}},
     "tilted about y": {2: {"tilt_deg": (0.0, -2.0)}},
@@ -161,7 +166,7 @@ def in_optilands_words(a_lens: Any, row: dict[str, Any], k: int) -> dict[str, An
     words["odd_asphere"] = list(surface.odd_asphere)
     words |= {"dx": dx, "dy": dy, "rx": tilt[0], "ry": tilt[1]}
     if surface.toroidal:
-        words |= {"curvature_x": cx, "conic_x": kx}
+        words |= {"curvature_x": cx, "conic_x": kx, "torus": surface.torus}
     if surface.figure is not None:
         terms = dict(surface.figure.zernike_nm)
         # Noll's first term is piston; optiland's terms have root mean square 1 too

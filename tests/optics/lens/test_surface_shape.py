@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from prescriptions import TRIPLET, lens
 
-from flarewright.errors import LensError
+from flarewright.errors import LensError, ProjectError
 from flarewright.kernels.tracing.intersect import AXES, ORIGIN, sag_of_shape
 from flarewright.model import Element, Figure, Lens
 from flarewright.optics.lens.surface_shape import has_rotational_symmetry, sag, seen_along, shape_table, transposed
@@ -51,6 +51,9 @@ ROWS = {
     "cylinder": {"curvature_x": 0.0},
     "cylinder across": {"curvature": 0.0, "curvature_x": 0.03, "conic_x": -2.0},
     "toroid": {"curvature_x": -0.02, "conic_x": 1.5, "conic": -0.5},
+    "torus": {"curvature_x": -0.02, "conic": -0.5, "torus": True},
+    "torus with terms": {"curvature_x": 0.03, "conic": 0.5, "torus": True, "asphere": (1e-5, -2e-7)},
+    "torus without profile": {"curvature": 0.0, "curvature_x": 0.03, "torus": True},
 }
 
 
@@ -61,6 +64,30 @@ def test_the_kernel_and_the_drawing_see_the_same_sag(name):
     x, y = np.random.default_rng(3).uniform(-6.0, 6.0, (2, 50))
     ours = np.array([sag_of_shape(table, 0, u, v)[0] for u, v in zip(x, y, strict=True)])
     assert np.abs(ours - sag(a_lens.rows[0], x, y)).max() < 1e-14
+
+
+def test_a_torus_is_its_profile_rotated_about_its_line():
+    """Each point keeps the distance 1 / cx - f(y) from the line through (0, ., 1 / cx)."""
+    row = shaped(curvature_x=-1.0 / 45.0, conic=-0.5, torus=True, asphere=(1e-5, -2e-7)).rows[0]
+    x, y = np.random.default_rng(6).uniform(-6.0, 6.0, (2, 50))
+    profile = sag(row.replace(curvature_x=0.0), np.zeros(50), y)
+    np.testing.assert_allclose(np.hypot(x, sag(row, x, y) + 45.0), profile + 45.0, rtol=1e-14)
+    # it leaves the biconic form in the fourth order
+    biconic = row.replace(torus=False, asphere=(), conic_x=0.0)
+    near, far = (float(sag(row.replace(asphere=()), at, at) - sag(biconic, at, at)) for at in np.array([0.5, 1.0]))
+    assert far / near == pytest.approx(16.0, rel=1e-2)
+
+
+def test_a_torus_of_equal_radii_is_a_sphere():
+    row = lens(TRIPLET, 5.0).rows[0]
+    x, y = np.random.default_rng(7).uniform(-6.0, 6.0, (2, 50))
+    np.testing.assert_allclose(sag(row.replace(torus=True), x, y), sag(row, x, y), rtol=1e-13)
+
+
+@pytest.mark.parametrize("more", [{"conic_x": 0.5}, {"odd_asphere": (1e-5,)}])
+def test_a_torus_is_a_circle_across_and_has_even_terms(more):
+    with pytest.raises(ProjectError, match=f"a torus .* leave out {next(iter(more))}, or torus"):
+        shaped(torus=True, **more)
 
 
 HEIGHTS = tuple(tuple(row) for row in np.random.default_rng(5).uniform(0.0, 1.0, (9, 9)))
@@ -116,7 +143,13 @@ def test_what_is_one_of_revolution():
     assert shape_table(shaped(odd_asphere=(1e-6,))) is not None
     assert has_rotational_symmetry(shaped(decentre=(0.0, 0.0), tilt_deg=(0.0, 0.0)))
     assert shape_table(shaped(decentre=(0.0, 0.0))) is None
-    for fields in ({"curvature_x": 0.0}, {"decentre": (0.1, 0.0)}, {"tilt_deg": (0.0, 1.0)}, {"figure": Figure()}):
+    for fields in (
+        {"curvature_x": 0.0},
+        {"torus": True},
+        {"decentre": (0.1, 0.0)},
+        {"tilt_deg": (0.0, 1.0)},
+        {"figure": Figure()},
+    ):
         assert not has_rotational_symmetry(shaped(**fields))
     assert not has_rotational_symmetry(
         lens(TRIPLET, 5.0).replace(elements=(Element(rows=(0, 1), decentre=(0.0, 0.1)),))
@@ -146,6 +179,8 @@ def test_meridians_change_places():
     other = transposed(a_lens).rows[0]
     assert (other.curvature, other.conic, *other.meridian_x) == (0.0, 0.1, a_lens.rows[0].curvature, 0.5)
     assert other.decentre is None
+    torus = transposed(shaped(curvature_x=0.02, conic=0.5, torus=True, asphere=(1e-5,))).rows[0]
+    assert (torus.curvature, torus.conic, torus.asphere, torus.torus) == (0.02, 0.0, (), False)
 
 
 def test_a_figure_needs_a_rim_and_an_image_that_was_read():

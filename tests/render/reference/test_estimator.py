@@ -188,7 +188,7 @@ def test_damaged_states_are_errors(tmp_path):
             read_reference_state(file)
     with pytest.raises(ProjectError, match="does not exist"):
         read_reference_state(tmp_path / "b.npz")
-    with pytest.raises(ProjectError, match="does not exist"):
+    with pytest.raises(ProjectError, match="is a folder; give the state file"):
         read_reference_state(tmp_path)
 
 

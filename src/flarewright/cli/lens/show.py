@@ -170,7 +170,8 @@ def _shape(row: Surface) -> str | None:
     if row.toroidal:
         curvature, conic = row.meridian_x
         radius = "flat" if curvature == 0.0 else f"{1.0 / curvature:.3f}"
-        words.append(f"{radius} across" + (f", conic {conic:g}" if conic else ""))
+        form = ", a torus" if row.torus else ""
+        words.append(f"{radius} across" + (f", conic {conic:g}" if conic else form))
     words += [f"A{4 + 2 * k} {term:g}" for k, term in enumerate(row.asphere) if term]
     words += [f"A{3 + 2 * k} {term:g}" for k, term in enumerate(row.odd_asphere) if term]
     if any(row.decentre or ()):

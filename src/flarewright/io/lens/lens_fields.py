@@ -101,5 +101,5 @@ TOP_KEYS = (
     "coating_presets",
 )
 STOP_KEYS = ("stop", "thickness")
-SHAPE_KEYS = ("radius_x", "curvature_x", "conic_x", "asphere", "odd_asphere", "decentre", "tilt_deg", "figure")
+SHAPE_KEYS = ("radius_x", "curvature_x", "conic_x", "torus", "asphere", "odd_asphere", "decentre", "tilt_deg", "figure")
 SURFACE_KEYS = ("radius", "curvature", "glass", "semi_diameter_estimated", "coating", *ROW_NUMBERS, *SHAPE_KEYS)

@@ -56,6 +56,10 @@ def read_shape(entry: dict[str, Any], where: str, folder: Path | None, problems:
     values: dict[str, Any] = {}
     if "conic_x" in entry and (number := CONIC_X.read(entry["conic_x"], f"{where}: conic_x", problems)) is not None:
         values["conic_x"] = number
+    if "torus" in entry and type(entry["torus"]) is bool:
+        values["torus"] = entry["torus"]
+    elif "torus" in entry:
+        problems.append(f"{where}: torus is {shorten(entry['torus'])}, true or false was expected")
     for key, first, second in (("asphere", "A4", "A6"), ("odd_asphere", "A3", "A5")):
         if key not in entry:
             continue
@@ -218,6 +222,8 @@ def shape_parts(row: Surface, number: Any, quoted: Any, radius: Any) -> list[str
         parts.append(radius(row.curvature_x, "_x"))
     if row.conic_x is not None:
         parts.append(f"conic_x = {number(row.conic_x)}")
+    if row.torus:
+        parts.append("torus = true")
     for key in ("asphere", "odd_asphere", "decentre", "tilt_deg"):
         values = getattr(row, key)
         if values:
@@ -243,6 +249,7 @@ def shape_schema() -> dict[str, Any]:
     return {
         "curvature_x": CURVATURE.schema(),
         "conic_x": CONIC_X.schema(),
+        "torus": {"type": "boolean", "description": "the profile along y rotates at the radius across; else biconic"},
         "asphere": {**terms, "description": "A4, A6, ... of the sag's even terms, 1/mm^3, 1/mm^5, ..."},
         "odd_asphere": {**terms, "description": "A3, A5, ... of the sag's odd terms, 1/mm^2, 1/mm^4, ..."},
         "decentre": {**pair, "items": OFFSET.schema(), "description": "x and y offset of the vertex from the axis, mm"},

@@ -31,8 +31,10 @@ from .intersect import (
     SIDE,
     TANGENT,
     TERMS,
+    TORUS,
     height_of_image,
     intersect_conic,
+    torus_sag,
 )
 from .refract import ALIVE, LANES, REFLECT, REL, STOP, STOP_X, WEIGHT, X, Y, bend_at, ray_from_near
 
@@ -205,6 +207,29 @@ def _meet_sag(shapes, row, heading, alive, work):
 @inlined
 def _sags(shapes, row, alive, work):
     """Evaluate `kernels.tracing.intersect.sag_of_shape` at the hits of all lanes: height, slopes, room."""
+    torus = shapes[row, TORUS] > 0.0
+    if torus:
+        for m in range(LANES):
+            x, y = work[PX, m] + work[T, m] * work[UX, m], work[PY, m] + work[T, m] * work[UY, m]
+            work[AT_X, m], work[AT_Y, m] = x, y
+            work[SAGS, m], work[GX, m], work[GY, m], work[ROOM, m] = torus_sag(shapes, row, x, y)
+    else:
+        _biconics(shapes, row, work)
+    terms = 0
+    for k in range(TERMS):
+        if shapes[row, ASPHERE + k] != 0.0:
+            terms = k + 1
+    if terms > 0 and not torus:
+        _aspheres(shapes, row, ASPHERE, terms, False, work)
+    if shapes[row, ODD_COUNT] > 0.0:
+        _aspheres(shapes, row, ODD, int(shapes[row, ODD_COUNT]), True, work)
+    if shapes[row, DEGREE] >= 0.0 or shapes[row, SIDE] > 0.0:
+        _figures(shapes, row, alive, work)
+
+
+@inlined
+def _biconics(shapes, row, work):
+    """Evaluate the biconic form of all lanes (`kernels.tracing.intersect`)."""
     cx, cy = shapes[row, CURVATURE_X], shapes[row, CURVATURE_Y]
     qx, qy = (1.0 + shapes[row, CONIC_X]) * cx * cx, (1.0 + shapes[row, CONIC_Y]) * cy * cy
     for m in range(LANES):
@@ -217,16 +242,6 @@ def _sags(shapes, row, alive, work):
         work[ROOM, m], work[SAGS, m] = room, whole * below
         work[GX, m], work[GY, m] = 2.0 * cx * x * below + bend * qx * x, 2.0 * cy * y * below + bend * qy * y
         work[AT_X, m], work[AT_Y, m] = x, y
-    terms = 0
-    for k in range(TERMS):
-        if shapes[row, ASPHERE + k] != 0.0:
-            terms = k + 1
-    if terms > 0:
-        _aspheres(shapes, row, ASPHERE, terms, False, work)
-    if shapes[row, ODD_COUNT] > 0.0:
-        _aspheres(shapes, row, ODD, int(shapes[row, ODD_COUNT]), True, work)
-    if shapes[row, DEGREE] >= 0.0 or shapes[row, SIDE] > 0.0:
-        _figures(shapes, row, alive, work)
 
 
 @inlined

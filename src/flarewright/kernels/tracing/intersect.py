@@ -23,7 +23,8 @@ SIDE = 78  # knots per side of the height image; 0: none
 HALF = 79  # the image spans [-HALF, HALF], mm
 ODD_COUNT = 80  # number of odd terms; 0: none
 ODD = 81  # A3, A5, ...; as many as even ones
-HEIGHTS = 90  # row by row in x
+TORUS = 90  # 1: the profile along y rotates about a line parallel to y; 0: biconic
+HEIGHTS = 91  # row by row in x
 
 CENTRED, CONIC, SAG = 0.0, 1.0, 2.0
 
@@ -180,6 +181,40 @@ def _spline(knot, t):
     return t * t * t / 6.0, 0.5 * t * t
 
 
+@inner
+def _biconic(shapes, row, x, y):
+    """Return the biconic form, its gradient, and its room."""
+    cx, cy = shapes[row, CURVATURE_X], shapes[row, CURVATURE_Y]
+    qx, qy = (1.0 + shapes[row, CONIC_X]) * cx * cx, (1.0 + shapes[row, CONIC_Y]) * cy * cy
+    room = 1.0 - qx * x * x - qy * y * y
+    root = sqrt(max(room, 1e-6))
+    whole = cx * x * x + cy * y * y
+    below = 1.0 / (1.0 + root)
+    # d(1 / (1 + root)) = below^2 (q x / root) dx
+    bend = whole * below * below / root
+    return whole * below, 2.0 * cx * x * below + bend * qx * x, 2.0 * cy * y * below + bend * qy * y, room
+
+
+@inner
+def torus_sag(shapes, row, x, y):
+    """Return the height of a torus, its gradient, and its room.
+
+    The profile f(y), a conic and its terms, rotates about a line parallel to y at the radius 1 / cx from the vertex
+    (Zemax, "Toroidal"): z = (1 - S) / cx with S^2 = (1 - cx f)^2 - (cx x)^2, written without the difference.
+    """
+    cx, cy = shapes[row, CURVATURE_X], shapes[row, CURVATURE_Y]
+    q = (1.0 + shapes[row, CONIC_Y]) * cy * cy
+    inside = 1.0 - q * y * y
+    root = sqrt(max(inside, 1e-6))
+    value, _, slope = _asphere(shapes, row, ASPHERE, TERMS, False, 0.0, y)
+    profile, slope = cy * y * y / (1.0 + root) + value, cy * y / root + slope
+    beside = 1.0 - cx * profile
+    around = beside * beside - cx * cx * x * x if beside > 0.0 else 0.0
+    distance = sqrt(max(around, 1e-6))
+    sag = (profile * (1.0 + beside) + cx * x * x) / (1.0 + distance)
+    return sag, cx * x / distance, beside * slope / distance, min(inside, around)
+
+
 @compiled
 def sag_of_shape(shapes, row, x, y):
     """Return the height of a surface over the plane of its vertex, in the surface's frame.
@@ -199,25 +234,21 @@ def sag_of_shape(shapes, row, x, y):
     slope_x, slope_y : float
         Its gradient.
     room : float
-        1 - (1 + kx) cx^2 x^2 - (1 + ky) cy^2 y^2; not positive where the surface does not exist.
+        1 - (1 + kx) cx^2 x^2 - (1 + ky) cy^2 y^2, or the lesser of a torus' two; not positive where the surface does
+        not exist.
 
     Notes
     -----
     z = (cx x^2 + cy y^2) / (1 + sqrt(room)) + A4 r^4 + A6 r^6 + ... + A3 r^3 + A5 r^5 + ... + figure: the biconic form.
-    It is a conic of revolution if both meridians are equal and a conic cylinder if one is straight.
+    It is a conic of revolution if both meridians are equal and a conic cylinder if one is straight. A torus has the
+    form of `torus_sag` instead, with its own terms.
     """
-    cx, cy = shapes[row, CURVATURE_X], shapes[row, CURVATURE_Y]
-    qx, qy = (1.0 + shapes[row, CONIC_X]) * cx * cx, (1.0 + shapes[row, CONIC_Y]) * cy * cy
-    room = 1.0 - qx * x * x - qy * y * y
-    root = sqrt(max(room, 1e-6))
-    whole = cx * x * x + cy * y * y
-    below = 1.0 / (1.0 + root)
-    sag = whole * below
-    # d(1 / (1 + root)) = below^2 (q x / root) dx
-    bend = whole * below * below / root
-    slope_x, slope_y = 2.0 * cx * x * below + bend * qx * x, 2.0 * cy * y * below + bend * qy * y
-    value, along_x, along_y = _asphere(shapes, row, ASPHERE, TERMS, False, x, y)
-    sag, slope_x, slope_y = sag + value, slope_x + along_x, slope_y + along_y
+    if shapes[row, TORUS] > 0.0:
+        sag, slope_x, slope_y, room = torus_sag(shapes, row, x, y)
+    else:
+        sag, slope_x, slope_y, room = _biconic(shapes, row, x, y)
+        value, along_x, along_y = _asphere(shapes, row, ASPHERE, TERMS, False, x, y)
+        sag, slope_x, slope_y = sag + value, slope_x + along_x, slope_y + along_y
     if shapes[row, ODD_COUNT] > 0.0:
         value, along_x, along_y = _asphere(shapes, row, ODD, int(shapes[row, ODD_COUNT]), True, x, y)
         sag, slope_x, slope_y = sag + value, slope_x + along_x, slope_y + along_y

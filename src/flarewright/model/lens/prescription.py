@@ -37,6 +37,9 @@ class Surface(Frozen):
         Conic constant; 0 is a sphere, -1 a paraboloid. Of a toroid or a cylinder: in the y-z plane.
     curvature_x, conic_x : float or None
         The same in the x-z plane; None: as in the y-z plane. A cylinder has one curvature that is 0.
+    torus : bool
+        The profile in the y-z plane, with its terms, rotates about a line parallel to y at the radius of the x-z plane,
+        where it is a circle. False: the biconic form, which differs from it in the fourth order.
     asphere : tuple of float
         A4, A6, ... of the sag's terms A4 r^4 + A6 r^6 + ..., 1/mm^3, 1/mm^5, ...
     odd_asphere : tuple of float
@@ -65,6 +68,7 @@ class Surface(Frozen):
     conic: float = 0.0
     curvature_x: float | None = None
     conic_x: float | None = None
+    torus: StrictBool = False
     asphere: tuple[float, ...] = Field((), max_length=MOST_TERMS)
     odd_asphere: tuple[float, ...] = Field((), max_length=MOST_TERMS)
     decentre: tuple[Offset, Offset] | None = None
@@ -80,12 +84,14 @@ class Surface(Frozen):
     def meridian_x(self) -> tuple[float, float]:
         """Curvature and conic constant in the x-z plane."""
         c = self.curvature if self.curvature_x is None else self.curvature_x
+        if self.torus:
+            return c, 0.0
         return c, self.conic if self.conic_x is None else self.conic_x
 
     @property
     def toroidal(self) -> bool:
-        """Whether the two meridians differ."""
-        return self.meridian_x != (self.curvature, self.conic)
+        """Whether it is a torus or its two meridians differ."""
+        return self.torus or self.meridian_x != (self.curvature, self.conic)
 
     @property
     def equator(self) -> float:
@@ -111,6 +117,14 @@ class Surface(Frozen):
     def displaced(self) -> bool:
         """Whether it is decentred or tilted."""
         return any(self.decentre or ()) or any(self.tilt_deg or ())
+
+    @model_validator(mode="after")
+    def _is_one_form(self) -> Surface:
+        if self.torus and self.conic_x:
+            raise ValueError("a torus is a circle in the x-z plane; leave out conic_x, or torus")
+        if self.torus and any(self.odd_asphere):
+            raise ValueError("a torus has even terms only; leave out odd_asphere, or torus")
+        return self
 
 
 class Stop(Frozen):

@@ -28,6 +28,7 @@ from ...kernels.tracing.intersect import (
     SCALE,
     SIDE,
     TANGENT,
+    TORUS,
 )
 from ...model import Element, Lens, Stop, Surface
 from ...typing import Floats
@@ -69,13 +70,15 @@ def ideal(lens: Lens) -> Lens:
 
 
 def transposed(lens: Lens) -> Lens:
-    """Return the ideal lens with its two meridians exchanged."""
+    """Return the ideal lens with its two meridians exchanged; a torus becomes a biconic surface of both curvatures."""
 
     def exchange(row: Surface | Stop) -> Surface | Stop:
         if not (isinstance(row, Surface) and row.toroidal):
             return row
         curvature, conic = row.meridian_x
-        return row.replace(curvature=curvature, conic=conic, curvature_x=row.curvature, conic_x=row.conic)
+        exchanged = {"curvature": curvature, "conic": conic, "curvature_x": row.curvature, "conic_x": row.conic}
+        # the circle of a torus has no terms
+        return row.replace(**exchanged, torus=False, asphere=() if row.torus else row.asphere)
 
     plain = ideal(lens)
     return plain.replace(rows=tuple(exchange(row) for row in plain.rows))
@@ -103,6 +106,12 @@ def sag(row: Surface | Stop, x: Floats, y: Floats) -> Floats:
     if isinstance(row, Stop):
         return np.zeros(np.broadcast(x, y).shape)
     (cx, kx), cy, ky = row.meridian_x, row.curvature, row.conic
+    if row.torus:
+        profile = cy * y**2 / (1.0 + np.sqrt(np.maximum(1.0 - (1.0 + ky) * cy**2 * y**2, 0.0)))
+        profile = profile + sum(term * y ** (2 * k + 4) for k, term in enumerate(row.asphere))
+        beside = 1.0 - cx * profile
+        around = np.sqrt(np.maximum(beside**2 - cx**2 * x**2, 0.0))
+        return np.asarray((profile * (1.0 + beside) + cx * x**2) / (1.0 + around))
     room = 1.0 - (1.0 + kx) * cx**2 * x**2 - (1.0 + ky) * cy**2 * y**2
     found: Floats = (cx * x**2 + cy * y**2) / (1.0 + np.sqrt(np.maximum(room, 0.0)))
     r2 = x**2 + y**2
@@ -143,6 +152,7 @@ def shape_table(lens: Lens) -> Floats | None:
         entry[ORIGIN : ORIGIN + 3], entry[AXES : AXES + 9] = origin, axes.ravel()
         entry[CURVATURE_X], entry[CONIC_X] = row.meridian_x
         entry[CURVATURE_Y], entry[CONIC_Y] = row.curvature, row.conic
+        entry[TORUS] = row.torus
         moved = bool(np.any(origin != 0.0) or np.any(axes != np.eye(3)))
         entry[KIND] = (
             SAG if row.asphere or row.odd_asphere or not is_surface_of_revolution(row) else CONIC if moved else CENTRED

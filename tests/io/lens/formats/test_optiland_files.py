@@ -53,6 +53,18 @@ def opened(tmp_path, data):
     return open_lens(path)
 
 
+def test_a_sum_of_two_curved_profiles_is_refused_and_not_written(tmp_path):
+    """Optiland's BiconicGeometry adds the sags of both meridians; the biconic form has one root for both."""
+    data = copy.deepcopy(LENS)
+    data["surface_group"]["surfaces"][2]["geometry"]["radius_x"] = 80.0
+    with pytest.raises(LensError, match="surface 2: a BiconicGeometry with a curvature in both meridians"):
+        opened(tmp_path, data)
+    lens = opened(tmp_path, LENS).lens
+    bent = lens.rows[1].replace(curvature_x=1.0 / 80.0)
+    with pytest.raises(LensError, match=r"row 1 has a curvature in both meridians, .* make it a torus"):
+        export_lens(lens.replace(rows=(lens.rows[0], bent, *lens.rows[2:])), tmp_path / "out.json")
+
+
 def test_the_numbers_of_the_file(tmp_path):
     lens = opened(tmp_path, LENS).lens
     assert (lens.name, lens.field_deg) == ("Own lens", 5.0)

@@ -450,14 +450,40 @@ def test_an_odd_asphere_of_even_powers_is_an_even_one(tmp_path):
     )
 
 
+def test_a_toroid_is_its_profile_rotated_at_its_radius(tmp_path):
+    more = ["CONI -0.5", "PARM 1 -40.0", "PARM 3 1E-5", "PARM 4 -2E-8"]
+    rest = (surface(2, 0.0, 2.0), surface(3, 0.0, 20.0, more=["STOP"]), surface(4))
+    text = text_of(surface(1, 0.01, 4.0, "N-BK7 0 0 1.5 40", "6 1", "TOROIDAL", more), *rest)
+    lens = loaded(write(tmp_path, text))[0]
+    x, y = np.array([0.0, 3.0, 5.0]), np.array([4.0, -1.0, 2.0])
+    profile = 0.01 * y**2 / (1 + np.sqrt(1 - 0.5 * 0.01**2 * y**2)) + 1e-5 * y**4 - 2e-8 * y**6
+    np.testing.assert_allclose(sag(lens.rows[0], x, y), -40.0 + np.sqrt((40.0 + profile) ** 2 - x**2), rtol=1e-12)
+    # in centimetres it is the same shape
+    more = ["CONI -0.5", "PARM 1 -4.0", "PARM 3 1E-2", "PARM 4 -2E-3"]
+    small = text_of(
+        surface(1, 0.1, 0.4, "N-BK7 0 0 1.5 40", "0.6 1", "TOROIDAL", more),
+        surface(2, 0.0, 0.2), surface(3, 0.0, 2.0, more=["STOP"]), surface(4), unit="CM"
+    )  # fmt: skip
+    same = loaded(write(tmp_path, small))[0].rows[0]
+    np.testing.assert_allclose(sag(same, x, y), sag(lens.rows[0], x, y), rtol=1e-12)
+    for name in ("t.zmx", "t.toml", "t.json"):
+        export_lens(lens, tmp_path / name)
+        again = load_lens(tmp_path / name)
+        np.testing.assert_allclose(sag(again.rows[0], x, y), sag(lens.rows[0], x, y), rtol=1e-13, err_msg=name)
+    with pytest.raises(LensError, match=r"above y\^14"):
+        export_lens(
+            lens.replace(rows=(lens.rows[0].replace(asphere=(0.0,) * 6 + (1e-20,)), *lens.rows[1:])), tmp_path / "u.zmx"
+        )
+
+
 @pytest.mark.parametrize(
     ("kind", "curvature", "more", "said"),
     [
         ("ODDASPHE", 0.01, ["PARM 1 1E-4"], "surface 1 has a term of r, a tip without a normal on the axis"),
         ("XOSPHERE", 0.01, ["XDAT 1 21", "XDAT 23 1E-40"], r"surface 1 has terms beyond r\^19"),
         ("XOSPHERE", 0.01, ["XDAT 1 3", "XDAT 6 1E-4"], "XDAT 6 lies beyond the number of terms"),
-        ("TOROIDAL", 0.01, ["PARM 1 40"], "surface 1 is a toroid with a curvature in both meridians"),
-        ("TOROIDAL", 0.01, ["PARM 3 1E-4"], r"surface 1 is a toroid with terms \(PARM 3\)"),
+        ("TOROIDAL", 0.01, ["PARM 1 40", "PARM 2 1E-4"], r"surface 1 has a term of r\^2 beside its curvature"),
+        ("TOROIDAL", 0.01, ["PARM 1 40", "XDAT 3 1E-4"], r"surface 1 is a toroid with Zernike terms \(XDAT 3\)"),
     ],
 )
 def test_shapes_that_a_surface_cannot_have_are_refused(tmp_path, kind, curvature, more, said):

@@ -1,9 +1,10 @@
 """Lenses of Optiland (`.json`): reader and writer.
 
 The file holds `aperture`, `fields` and `surface_group`, whose surfaces have a geometry (Plane, StandardGeometry,
-EvenAsphere, OddAsphere or BiconicGeometry with a position `cs`), the material behind (AbbeMaterial, Material or
-IdealMaterial), `is_stop` and `aperture`. Object and image are surfaces, too. Source: files that the program saves, and
-its documentation.
+EvenAsphere, OddAsphere, BiconicGeometry or ToroidalGeometry with a position `cs`), the material behind (AbbeMaterial,
+Material or IdealMaterial), `is_stop` and `aperture`. Object and image are surfaces, too. Its BiconicGeometry adds the
+sags of two profiles, which is the biconic form only for a cylinder. Source: files that the program saves, and its
+documentation.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from ..lens_fields import CURVATURE
 from ..medium_names import numbered_medium
 
 _ROUNDED = 1e-6
-_GEOMETRIES = ("Plane", "StandardGeometry", "EvenAsphere", "OddAsphere", "BiconicGeometry")
+_GEOMETRIES = ("Plane", "StandardGeometry", "EvenAsphere", "OddAsphere", "BiconicGeometry", "ToroidalGeometry")
 _FREE = {"type": "IdealMaterial", "propagation_model": {"class": "HomogeneousPropagation"}, "index": 1.0, "absorp": 0.0}
 _Findings = list[tuple[int, media.Finding]]
 
@@ -144,9 +145,26 @@ def _shape(where: str, kind: str, geometry: Mapping[str, Any], problems: list[st
         return value or 0.0
 
     if kind == "BiconicGeometry":
-        return {
+        found = {
             "curvature": curvature("radius_y"), "conic": conic("conic_y"), "curvature_x": curvature("radius_x"),
             "conic_x": conic("conic_x"),
+        }  # fmt: skip
+        if found["curvature"] and found["curvature_x"]:
+            problems.append(
+                f"{where}: a BiconicGeometry with a curvature in both meridians, whose sags Optiland adds, is not "
+                "supported; give a ToroidalGeometry or a cylinder"
+            )
+        return found
+    if kind == "ToroidalGeometry":
+        terms = geometry.get("coeffs_poly_y", [])
+        numbers = [json_number(value) for value in terms] if isinstance(terms, list) else [None]
+        if None in numbers or len(numbers) > MOST_TERMS + 1 or any(numbers[:1]):
+            problems.append(
+                f"{where}: its coeffs_poly_y must be numbers of y^2, which must be 0, to y^{2 * MOST_TERMS + 2}"
+            )
+        return {
+            "curvature": curvature("radius_y"), "conic": conic("conic_yz"), "curvature_x": curvature("radius_x"),
+            "torus": True, "asphere": tuple(value or 0.0 for value in numbers[1 : MOST_TERMS + 1]),
         }  # fmt: skip
     values: dict[str, Any] = {"curvature": curvature("radius"), "conic": conic("conic")}
     if kind not in ("EvenAsphere", "OddAsphere"):
@@ -275,11 +293,22 @@ def _geometry(k: int, row: Surface, z: float) -> dict[str, Any]:
     radius = 1.0 / row.curvature if row.curvature else math.inf
     steps = {"tol": 1e-10, "max_iter": 100}
     if row.toroidal:
-        if row.terms:
+        if row.terms and not row.torus:
             raise LensError(
                 f"row {k} has different curvatures in its meridians and aspheric terms, which a .json cannot hold"
             )
         across, conic = row.meridian_x
+        if row.torus:
+            return {
+                "type": "ToroidalGeometry", "cs": _place(z), **steps, "radius": radius, "conic": 0.0,
+                "radius_x": 1.0 / across if across else math.inf, "radius_y": radius, "conic_yz": row.conic,
+                "coeffs_poly_y": [0.0, *row.asphere],
+            }  # fmt: skip
+        if across and row.curvature:
+            raise LensError(
+                f"row {k} has a curvature in both meridians, whose biconic form a .json cannot hold; make it a torus, "
+                "or write a .zmx or .toml file"
+            )
         return {
             "type": "BiconicGeometry", "cs": _place(z), **steps, "radius_x": 1.0 / across if across else math.inf,
             "radius_y": radius, "conic_x": conic, "conic_y": row.conic,

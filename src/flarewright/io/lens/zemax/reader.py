@@ -238,22 +238,17 @@ def _even_and_odd(block: Block, problems: list[str]) -> tuple[dict[int, float], 
 
 
 def _toroid(block: Block, curvature: float, conic: float, mm: float, problems: list[str]) -> dict[str, object]:
-    """Return a cylinder, whose sag is that of a surface with a curvature in each meridian; refuse other toroids.
+    """Return a torus or a cylinder; refuse one with Zernike terms.
 
-    The conic of the y-z plane turns about an axis parallel to y at the radius of parameter 1. If that radius is
-    infinite (0) or the conic is a line, the sag depends on one coordinate, and both descriptions agree.
+    The profile of the y-z plane, a conic and even terms of y (parameters 2 to 8), rotates about an axis parallel to y
+    at the radius of parameter 1; 0 is a cylinder.
     """
     where, radius = f"surface {block.number}", block.parameters.get(1, 0.0) * mm
-    terms = [f"PARM {n}" for n, value in block.parameters.items() if 2 <= n <= 8 and value]
-    terms += [f"XDAT {n}" for n, value in block.extra.items() if value]
-    if terms:
-        problems.append(f"{where} is a toroid with terms ({', '.join(terms[:3])}), which are not supported")
-    elif radius and curvature:
-        problems.append(
-            f"{where} is a toroid with a curvature in both meridians, which is not supported: give a cylinder, or a "
-            "BICONICX surface of the same curvatures"
-        )
-    return {"curvature": curvature, "conic": conic, "curvature_x": 1.0 / radius if radius else 0.0, "conic_x": 0.0}
+    if figure := [f"XDAT {n}" for n, value in block.extra.items() if value]:
+        problems.append(f"{where} is a toroid with Zernike terms ({', '.join(figure[:3])}), which are not supported")
+    terms = {n - 1: value / mm ** (2 * n - 3) for n, value in block.parameters.items() if 2 <= n <= 8}
+    profile = _asphere(where, curvature, conic, terms, problems)
+    return {**profile, "curvature_x": 1.0 / radius if radius else 0.0, "torus": True}
 
 
 def _asphere(

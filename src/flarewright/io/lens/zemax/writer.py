@@ -20,6 +20,8 @@ _SAME_INDEX = 1e-6
 _SAME_ABBE = 0.01
 # aspheric terms from r^4 on: Zemax's even asphere has eight, from r^2 to r^16
 _MOST_TERMS = 7
+# y^4 to y^14 of a torus
+_MOST_TORUS_TERMS = 6
 # its odd asphere those of r to r^8; the extended one has as many as it states
 _MOST_ODD_POWER = 8
 
@@ -127,19 +129,27 @@ def _surface(
             *lines, "  STOP", "  TYPE STANDARD", '  CURV 0.0 0 0 0 0 ""', f"  DISZ {gap!r}",
             f'  DIAM {stop_semi!r} 0 0 0 1 ""',
         ]  # fmt: skip
-    if row.toroidal and row.terms:
+    if row.toroidal and row.terms and not row.torus:
         raise LensError(f"row {k} has different curvatures in its meridians and aspheric terms, which .zmx cannot hold")
+    if row.torus and len(row.asphere) > _MOST_TORUS_TERMS:
+        raise LensError(f"row {k} is a torus with terms above y^14, which .zmx cannot hold; write a .toml file")
     odd = any(row.odd_asphere)
     if len(row.asphere) > _MOST_TERMS and not odd:
         raise LensError(f"row {k} has aspheric terms above r^16, which .zmx cannot hold; write a .toml or .json file")
     extended = odd and max(row.terms) > _MOST_ODD_POWER
     kind = "BICONICX" if row.toroidal else "EVENASPH" if any(row.asphere) else "STANDARD"
+    if row.torus:
+        kind = "TOROIDAL"
     if odd:
         kind = "XOSPHERE" if extended else "ODDASPHE"
     lines += [f"  TYPE {kind}", f'  CURV {row.curvature!r} 0 0 0 0 ""', f"  CONI {row.conic!r}"]
     if row.toroidal:
         across, conic = row.meridian_x
-        lines += [f"  PARM 1 {1.0 / across if across else 0.0!r}", f"  PARM 2 {conic!r}"]
+        lines += [f"  PARM 1 {1.0 / across if across else 0.0!r}"]
+        # behind the radius a torus has its terms, of which that of y^2 is in the curvature
+        lines += [
+            f"  PARM {n} {number!r}" for n, number in enumerate((0.0, *row.asphere) if row.torus else (conic,), 2)
+        ]
     elif extended:
         # the number of terms and the radius that r is divided by come first
         lines += [f"  XDAT 1 {max(row.terms)} 0 0", "  XDAT 2 1.0 0 0"]
