@@ -178,7 +178,8 @@ app.chooseGhostTarget = (number) => {
 };
 app.chooseLight = (k) => { if (app.light !== k) { app.light = k; app.refreshPanel(); } };
 function writeLights(lights) {
-  if (app.tab === 'light') panels.light.moved?.(lights[app.light]);
+  // a light that was added after this picture was requested has no place in it
+  if (app.tab === 'light' && lights[app.light]) panels.light.moved?.(lights[app.light]);
 }
 // writing numbers costs a layout of the panel: ten times a second is enough
 let wrote = 0;
