@@ -19,9 +19,6 @@ function sensorOf({ sensor_mm: own, size_px: size }) {
 }
 const fitted = (key, size) => cropped(pair(key), size).map((mm) => Number(mm.toFixed(3)));
 
-// found lights have numbers, as there may be many
-const labelOf = (light, k, state) => (/^plate-\d+$/.test(light.name) && state.plate?.lit ? String(k + 1) : light.name === 'light' ? `Light ${k + 1}` : light.name.charAt(0).toUpperCase() + light.name.slice(1));
-
 export function lightPanel(app) {
   const one = (state) => state.lights[app.light];
   const set = (values, held = '') => app.lively('set_light', { light: app.light, values }, held);
@@ -81,7 +78,7 @@ export function lightPanel(app) {
   return {
     element: h('div', {}, lights.element, plate.element, path.element, shot.element, seeing.element, hiding.element, work.element),
     update(state) {
-      refill(choose, [...state.lights.map((light, k) => button(labelOf(light, k, state), () => { app.chooseLight(k); app.panels.light.update(app.state); app.view.redraw(); }, { kind: k === app.light ? 'on' : '', tip: 'Choose the light for the controls below, the arrow keys and drags in the picture.' })),
+      refill(choose, [...state.lights.map((light, k) => button(light.label, () => { app.chooseLight(k); app.panels.light.update(app.state); app.view.redraw(); }, { kind: k === app.light ? 'on' : '', tip: 'Choose the light for the controls below, the arrow keys and drags in the picture.' })),
         button('+', () => app.command('add_light', {}).then(() => { app.chooseLight(app.state.lights.length - 1); app.view.redraw(); }).catch(() => {}), { id: 'light-add', kind: 'quiet', tip: 'Add a light.' }),
         button('Remove', () => app.command('remove_light', { light: app.light }).catch(() => {}), { kind: 'quiet', disabled: state.lights.length < 2, tip: 'Remove the chosen light; the last one cannot be removed.' })]);
       plainIntensity.element.hidden = Boolean(state.plate?.lit);
