@@ -1,7 +1,7 @@
 // The page: one state from the server, shown by panels; every change is a command that the server runs or rejects.
 import { LOST, complain, get, inLine, inWords, latest, post, sentence, socketAddress, under } from './api.js';
 import { fitted } from './section.js';
-import { button, dialog, forget, h, hush, menu, stroke, tips, toast, slider } from './ui.js';
+import { button, dialog, forget, h, hush, menu, press, stroke, tips, toast, slider } from './ui.js';
 import { viewport } from './viewport.js';
 import { coatingPanel } from './panel_coating.js';
 import { ghostPanel } from './panel_ghosts.js';
@@ -267,7 +267,7 @@ function header() {
       look.children[2].disabled = !state.aces;
       look.children[2].textContent = state.aces ? 'ACES' : 'ACES (pip install opencolorio)';
       exposure.update(state);
-      auto.classList.toggle('on', state.plate?.lit ? state.view.plate_stops === 0 : state.view.exposure_stops === null);
+      press(auto, state.plate?.lit ? state.view.plate_stops === 0 : state.view.exposure_stops === null);
     },
   };
 }
@@ -395,6 +395,7 @@ app.open = (tab) => {
   app.tab = tab;
   for (const each of $('tabs').children) { each.setAttribute('aria-selected', each.dataset.tab === tab); each.tabIndex = each.dataset.tab === tab ? 0 : -1; }
   $('page').replaceChildren(panels[tab].element);
+  $('page').setAttribute('aria-labelledby', `tab-${tab}`);
   app.view.annotate = tab === 'target';
   if (tab !== 'target') app.view.compare = 'physical';
   panels[tab].shown?.();
@@ -405,7 +406,7 @@ app.open = (tab) => {
 };
 function tabs() {
   Object.entries(NAMES).forEach(([key, name], k) => $('tabs').append(
-    h('button', { role: 'tab', type: 'button', 'data-tab': key, onclick: () => app.open(key), tip: `Key ${k + 1}` }, name)));
+    h('button', { role: 'tab', type: 'button', id: `tab-${key}`, 'aria-controls': 'page', 'data-tab': key, onclick: () => app.open(key), tip: `Key ${k + 1}` }, name)));
   $('tabs').addEventListener('keydown', (event) => {
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (!step) return;
