@@ -1,8 +1,10 @@
 """What a screen reader announces, what the Tab key reaches, and whether all text can be read: `pytest -m browser`."""
 
+import io
 import json
 
 import pytest
+from PIL import Image
 
 pytest.importorskip("playwright", reason="the extra e2e is not installed")
 pytest.importorskip("starlette", reason="the extra ui is not installed")
@@ -80,6 +82,10 @@ def test_all_text_can_be_read_and_all_controls_have_names(tab, size):
             tab.page.locator("[data-lens]").first.wait_for()
         found[name] = tab.js(READABLE) + tab.js(NAMELESS)
     assert found == {name: [] for name in PANELS}
+    tab.page.keyboard.press("o")
+    tab.page.locator("dialog").wait_for()
+    assert tab.js(READABLE) + tab.js(NAMELESS) == []
+    tab.page.keyboard.press("Escape")
     # muted ghosts under the pointer and chosen ones
     tab.tab("ghosts")
     row = tab.page.locator("tr.muted")
@@ -97,6 +103,14 @@ def test_a_long_name_of_a_file_is_shown_in_full(tab, tmp_path):
     drop(tab, f"{'unreadable_' * 20}.png", b"\x89PNG")
     tab.page.locator(".toast.error").wait_for()
     assert tab.js(READABLE) == []
+    # beside a button there is room for two lines, and the title has the whole name
+    encoded = io.BytesIO()
+    Image.new("RGB", (64, 36)).save(encoded, "PNG")
+    drop(tab, f"{'plate_' * 20}.png", encoded.getvalue())
+    tab.until("flarewright.state.plate")
+    name = tab.page.locator("#plate-none + .quietly")
+    assert name.get_attribute("title").endswith("plate_.png")
+    assert name.bounding_box()["height"] < 40
 
 
 def test_a_screen_reader_gets_values_and_states(tab):

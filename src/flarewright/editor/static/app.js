@@ -313,7 +313,7 @@ async function copyCommand() {
 }
 // A dialog for a file name; an error appears in it, so that the name can be corrected.
 function asking(title, words, value, path, done = () => {}) {
-  const box = h('input', { type: 'text', value, style: 'width:420px', name: 'path', spellcheck: 'false' });
+  const box = h('input', { type: 'text', value, style: 'width:420px', name: 'path', 'aria-label': words, spellcheck: 'false' });
   const wrong = h('p', { class: 'wrong', role: 'alert' });
   const form = h('form', {}, h('p', { class: 'quietly' }, words), box, wrong, h('div', { class: 'buttons', style: 'justify-content:end;margin-top:10px' },
     button('Cancel', () => window_.close()), h('button', { class: 'main', type: 'submit' }, title)));

@@ -20,7 +20,7 @@ export function holdoutGroup(app) {
   const over = slider({ label: 'Overscan', name: 'overscan', tip: 'Size of the picture relative to the frame, so that lights beside the frame can be hidden.', min: 1, max: 10, step: 0.01, curve: 2, get: (s) => here(s)?.overscan ?? 1, set: (overscan, held) => set({ overscan }, held) });
   const all = group('Occluders', [
     choice({ label: 'Of', name: 'holdout_of', tip: 'One picture for all lights, and an additional one for each light.', options: [['all', 'all lights'], ['one', 'the chosen light']], get: () => (whole ? 'all' : 'one'), set: (value) => { whole = value === 'all'; all.update(app.state); } }),
-    { element: files, update: (s) => { const found = here(s); name.textContent = (found?.image ?? found?.depth ?? '').split(/[\\/]/).pop(); none.disabled = !found; } },
+    { element: files, update: (s) => { const found = here(s); name.title = found?.image ?? found?.depth ?? ''; name.textContent = name.title.split(/[\\/]/).pop(); none.disabled = !found; } },
     flip, unit, over,
   ]);
   const { update } = all;
