@@ -228,6 +228,27 @@ def test_a_light_that_another_tab_takes_away_is_held_no_more(tab):
     assert tab.js("flarewright.view.shownGrade") == "final"
 
 
+def test_a_light_removed_during_its_drag_hands_the_drag_to_no_other(tab):
+    """The next light, which got its number, used to jump to the pointer."""
+    tab.page.click("#light-add")
+    tab.until("flarewright.state.lights.length === 2 && flarewright.light === 1")
+    tab.rest()
+    other = tab.state()["lights"][1]["field_deg"]
+    x, y = tab.light()
+    tab.page.mouse.move(x, y)
+    tab.page.mouse.down()
+    tab.page.mouse.move(x - 60, y + 30, steps=5)
+    tab.until("flarewright.view.drag?.kind === 'light' && flarewright.view.shownGrade === 'moving'")
+    tab.page.locator("#view").focus()
+    tab.page.keyboard.press("Delete")
+    tab.until("flarewright.state.lights.length === 1")
+    tab.page.mouse.move(x - 120, y + 60, steps=5)
+    tab.page.mouse.up()
+    tab.rest()
+    assert tab.state()["lights"][0]["field_deg"] == other
+    assert tab.js("flarewright.view.drag") is None
+
+
 def test_zoom_pan_and_wipe_are_reached_by_keys(tab):
     """They used to work with a mouse only."""
     view = tab.page.locator("#view")

@@ -41,8 +41,9 @@ function take(state) {
   Object.assign(state.view, asked);
   app.state = state;
   app.light = Math.min(app.light, state.lights.length - 1);
-  // end a drag whose light another tab has removed
-  if (app.view.drag?.light >= state.lights.length) { app.view.drag = null; app.view.letGo(); }
+  // end a drag whose light was removed: its number may be that of another light now
+  const dragged = app.view.drag?.light;
+  if (old && dragged !== undefined && old.lights[dragged]?.name !== state.lights[dragged]?.name) { app.view.drag = null; app.view.letGo(); }
   const before = known;
   known = { ghosts: ghostsOf(state), places: placesOf(state), shot: shotOf(state), design: JSON.stringify(state.design), seen: seenOf(state) };
   // another lens, or other row numbers, make other ghosts
