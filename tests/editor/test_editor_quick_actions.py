@@ -111,6 +111,21 @@ def test_undo_while_a_path_plays_can_be_done_again(tab):
     assert tab.state()["steps"] == steps
 
 
+def test_a_light_added_while_a_path_plays_is_no_error_of_the_page(tab):
+    """The pictures on their way lack it, which used to be a message of the script: "Cannot read properties"."""
+    tab.js("flarewright.command('set_key', {light: 0, at_s: 0})")
+    tab.js("flarewright.command('set_key', {light: 0, at_s: 3, field_deg: [-4, -2]})")
+    tab.until("flarewright.state.lights[0].keys.length === 2")
+    tab.page.locator("#view").focus()
+    tab.page.keyboard.press("t")
+    tab.until("flarewright.player.playing && flarewright.view.shownGrade === 'moving'")
+    tab.page.click("#light-add")
+    tab.until("flarewright.light === 1 && flarewright.view.mover.lights?.length === 2")
+    # the panel shows the new light as soon as a picture has it
+    tab.until("Math.abs(document.querySelector('[name=light_x]').value - flarewright.view.mover.lights[1][0]) < 0.006")
+    assert tab.page.locator(".toast.error").all_inner_texts() == []
+
+
 def test_the_circle_of_a_target_moves_with_the_light(tab):
     """It used to stand still while the light was dragged and the target picture moved."""
     tab.tab("target")
@@ -211,6 +226,27 @@ def test_a_light_that_another_tab_takes_away_is_held_no_more(tab):
     tab.rest()
     assert tab.light() == (x, y)
     assert tab.js("flarewright.view.shownGrade") == "final"
+
+
+def test_a_light_removed_during_its_drag_hands_the_drag_to_no_other(tab):
+    """The next light, which got its number, used to jump to the pointer."""
+    tab.page.click("#light-add")
+    tab.until("flarewright.state.lights.length === 2 && flarewright.light === 1")
+    tab.rest()
+    other = tab.state()["lights"][1]["field_deg"]
+    x, y = tab.light()
+    tab.page.mouse.move(x, y)
+    tab.page.mouse.down()
+    tab.page.mouse.move(x - 60, y + 30, steps=5)
+    tab.until("flarewright.view.drag?.kind === 'light' && flarewright.view.shownGrade === 'moving'")
+    tab.page.locator("#view").focus()
+    tab.page.keyboard.press("Delete")
+    tab.until("flarewright.state.lights.length === 1")
+    tab.page.mouse.move(x - 120, y + 60, steps=5)
+    tab.page.mouse.up()
+    tab.rest()
+    assert tab.state()["lights"][0]["field_deg"] == other
+    assert tab.js("flarewright.view.drag") is None
 
 
 def test_zoom_pan_and_wipe_are_reached_by_keys(tab):

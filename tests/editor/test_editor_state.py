@@ -405,6 +405,18 @@ def test_lights_that_are_added_have_names_of_their_own(project):
     assert [light.name for light in do(two, "add_light").lights] == ["light", "light 3", "light 4"]
 
 
+def test_no_added_light_is_hidden_by_another(project):
+    """The third one used to lie exactly on the first, as it mirrored the second."""
+    for first in ((6.0, 3.0), (-6.0, 0.0), (0.0, 0.0)):
+        many = project.replace(lights=(project.lights[0].replace(field_deg=first),))
+        for _ in range(7):
+            many = do(many, "add_light")
+        places = [light.field_deg for light in many.lights]
+        assert places[1] == (-first[0] if any(first) else -1.0, first[1])
+        assert len({(round(x, 1), round(y, 1)) for x, y in places}) == 8
+        assert max(abs(x) for x, _ in places) <= 7.0
+
+
 def test_a_command_on_a_row_does_not_apply_to_another_lens():
     session, _ = begin(None)
     with pytest.raises(FlarewrightError, match=r"^exposure must be at most 60, not 1000$"):

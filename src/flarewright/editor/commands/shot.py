@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import count
+from itertools import chain, count
 from typing import Any
 
 from ...errors import ProjectError
@@ -16,6 +16,8 @@ from ...render.scene.resolve import open_lens, resolve_project
 
 # largest angle of a dragged light: beyond it a flat picture has no place for the light
 STEEPEST_DEG = 80.0
+# an added light is at least this far from all others
+APART_DEG = 0.1
 
 
 def move_light(project: Project, light: int, x: float, y: float) -> Project:
@@ -44,14 +46,27 @@ def set_light(project: Project, light: int, values: dict[str, Any]) -> Project:
 
 
 def add_light(project: Project) -> Project:
-    """Add a light on the other side of the picture."""
-    x, y = project.lights[-1].field_deg
+    """Add a light on the other side of the picture, where no other light hides it."""
     taken = {light.name for light in project.lights}
     name = next(name for k in count(len(project.lights) + 1) if (name := f"light {k}") not in taken)
     # in the unit of a plate, 1 may be a million times a lamp
     intensity = project.lights[-1].intensity if project.lit_by_plate else 1.0
-    new = Light(name=name, field_deg=(-x, y), spectrum=BlackBody(temperature_k=3200.0), intensity=intensity)
+    place = _free_place(project)
+    new = Light(name=name, field_deg=place, spectrum=BlackBody(temperature_k=3200.0), intensity=intensity)
     return project.replace(lights=(*project.lights, new))
+
+
+def _free_place(project: Project) -> tuple[float, float]:
+    """Return mirrored angles of the last light, or the nearest ones towards the middle that no light has."""
+    x, y = project.lights[-1].field_deg
+    mirrored = ((-x, y), (-x, -y), (x, -y))
+    inwards = ((-x + (k if x > 0.0 else -k), y) for k in count(1))
+    taken = [light.field_deg for light in project.lights]
+    return next(
+        place
+        for place in chain(mirrored, inwards)
+        if all(max(abs(place[0] - u), abs(place[1] - v)) >= APART_DEG for u, v in taken)
+    )
 
 
 def remove_light(project: Project, light: int) -> Project:

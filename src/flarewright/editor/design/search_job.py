@@ -24,7 +24,7 @@ from ...design.solvers.evolution_log import until
 from ...design.solvers.polish import compile_kernels
 from ...design.solvers.pool_search import PoolState, solve
 from ...errors import FlarewrightError, OutputError, ProjectError
-from ...model import AsLens, CoatingChoice, Design, Everywhere, InTurn, Lens, PerRow, Project, Surface
+from ...model import AsLens, CoatingChoice, Everywhere, InTurn, Lens, PerRow, Project, Surface
 from ...optics.lens.paraxial import first_order
 from ...optics.rays.pack import resolve_coatings
 from ...render.scene.resolve import open_lens, resolve_project
@@ -32,6 +32,7 @@ from ...sentences import count
 from ...typing import Floats, Mask
 from ..commands.design_targets import clear_ghost_targets, ghost_target_names
 from ..common.latest_job import Check, Lane, refused_at_exit
+from ..common.light_names import with_light_names
 from ..preview.display_image import jpeg, pixels_of
 from ..preview.draft_match import Match as Held
 from ..preview.picture import Grade
@@ -276,7 +277,7 @@ class Solver:
         proven = obstacles(problem, project)
         if proven:
             why = " ".join(f"{one.target}: {one.reason}" for one in proven)
-            outcome = f"No lens can do that: {named(why, project.design)} ({outcome})"
+            outcome = f"No lens can do that: {named(why, project)} ({outcome})"
         self._end(project, outcome, state.seconds, found)
 
     def _keep(self, file: Path, state: PoolState) -> None:
@@ -296,7 +297,7 @@ class Solver:
             lens = one.lens.replace(name=f"After {name} {number}")
             coating = _coatings_for(project, lens)
             bare = "" if coating is not None else "; without the coatings, which do not fit it"
-            words = named(f"Lens {number}: {described(lens)}; {judged(one, problem)}{bare}", project.design)
+            words = named(f"Lens {number}: {described(lens)}; {judged(one, problem)}{bare}", project)
             changes = {"lens": lens, "coating": coating or AsLens(), "f_number": None, "zoom": None}
             out.append(_found(self._present_project(project), changes, words, self.display()))
         return tuple(out)
@@ -345,18 +346,18 @@ def _in_page_names(read: Callable[[Project], Any], project: Project) -> Any:
     try:
         return read(project)
     except FlarewrightError as error:
-        raise type(error)(named(str(error), project.design)) from None
+        raise type(error)(named(str(error), project)) from None
 
 
-def named(text: str, design: Design | None) -> str:
-    """Replace numbers of targets in a message by the page's names."""
-    names = () if design is None else ghost_target_names(design)
+def named(text: str, project: Project) -> str:
+    """Replace numbers of targets and lights in a message by the page's names."""
+    names = () if project.design is None else ghost_target_names(project.design)
 
     def name(found: re.Match[str]) -> str:
         number = int(found[1] or found[2])
         return names[number] if number < len(names) else found[0]
 
-    return _COUNTED.sub(name, text)
+    return with_light_names(_COUNTED.sub(name, text), project)
 
 
 def described(lens: Lens) -> str:

@@ -16,8 +16,10 @@ from ..commands.design_targets import ghost_target_names
 from ..commands.ghosts import override_of, soloed
 from ..commands.lens import prescription, table_of
 from ..commands.shot import coating_text, iris_of
+from ..common.light_names import light_label
 from ..design.search_job import Solver
 from ..preview.display_image import FALSE_COLOURS
+from ..preview.picture import page_remarks
 from ..preview.render_picture import pictured, rest_size, same_ghosts, view_size
 from ..preview.viewport import Screen
 from ..session.history import History, before_mask, design_before_added, design_before_scratch
@@ -85,7 +87,7 @@ def _picture(screen: Screen) -> dict[str, Any]:
         # places of its lights: a drag may have moved them during encoding
         "lights": [] if shown is None else [light.field_deg for light in shown.project.lights],
         # part of the picture, so that no older answer replaces those of a newer picture
-        "remarks": [] if shown is None else list(shown.remarks),
+        "remarks": [] if shown is None else list(page_remarks(shown)),
     }
 
 
@@ -145,7 +147,8 @@ def _lights(project: Project, round_lens: bool) -> list[dict[str, Any]]:
 def _light(project: Project, k: int) -> dict[str, Any]:
     light = project.lights[k]
     return {
-        "name": light.name, "field_deg": list(light.field_deg), "intensity": light.intensity,
+        "name": light.name, "label": light_label(project, k),
+        "field_deg": list(light.field_deg), "intensity": light.intensity,
         "spectrum": spectrum_text(light.spectrum) or light.spectrum.kind, "diameter_deg": light.diameter_deg,
         "distance": light.distance, "shape": None if light.shape is None else light.shape.model_dump(mode="json"),
         "starburst": light.starburst,

@@ -1,7 +1,7 @@
 // The page: one state from the server, shown by panels; every change is a command that the server runs or rejects.
 import { LOST, complain, get, inLine, inWords, latest, post, sentence, socketAddress, under } from './api.js';
 import { fitted } from './section.js';
-import { button, dialog, forget, h, hush, menu, stroke, tips, toast, slider } from './ui.js';
+import { button, dialog, forget, h, hush, menu, press, stroke, tips, toast, slider } from './ui.js';
 import { viewport } from './viewport.js';
 import { coatingPanel } from './panel_coating.js';
 import { ghostPanel } from './panel_ghosts.js';
@@ -41,8 +41,9 @@ function take(state) {
   Object.assign(state.view, asked);
   app.state = state;
   app.light = Math.min(app.light, state.lights.length - 1);
-  // end a drag whose light another tab has removed
-  if (app.view.drag?.light >= state.lights.length) { app.view.drag = null; app.view.letGo(); }
+  // end a drag whose light was removed: its number may be that of another light now
+  const dragged = app.view.drag?.light;
+  if (old && dragged !== undefined && old.lights[dragged]?.name !== state.lights[dragged]?.name) { app.view.drag = null; app.view.letGo(); }
   const before = known;
   known = { ghosts: ghostsOf(state), places: placesOf(state), shot: shotOf(state), design: JSON.stringify(state.design), seen: seenOf(state) };
   // another lens, or other row numbers, make other ghosts
@@ -178,7 +179,8 @@ app.chooseGhostTarget = (number) => {
 };
 app.chooseLight = (k) => { if (app.light !== k) { app.light = k; app.refreshPanel(); } };
 function writeLights(lights) {
-  if (app.tab === 'light') panels.light.moved?.(lights[app.light]);
+  // a light that was added after this picture was requested has no place in it
+  if (app.tab === 'light' && lights[app.light]) panels.light.moved?.(lights[app.light]);
 }
 // writing numbers costs a layout of the panel: ten times a second is enough
 let wrote = 0;
@@ -266,7 +268,7 @@ function header() {
       look.children[2].disabled = !state.aces;
       look.children[2].textContent = state.aces ? 'ACES' : 'ACES (pip install opencolorio)';
       exposure.update(state);
-      auto.classList.toggle('on', state.plate?.lit ? state.view.plate_stops === 0 : state.view.exposure_stops === null);
+      press(auto, state.plate?.lit ? state.view.plate_stops === 0 : state.view.exposure_stops === null);
     },
   };
 }
@@ -312,7 +314,7 @@ async function copyCommand() {
 }
 // A dialog for a file name; an error appears in it, so that the name can be corrected.
 function asking(title, words, value, path, done = () => {}) {
-  const box = h('input', { type: 'text', value, style: 'width:420px', name: 'path', spellcheck: 'false' });
+  const box = h('input', { type: 'text', value, style: 'width:420px', name: 'path', 'aria-label': words, spellcheck: 'false' });
   const wrong = h('p', { class: 'wrong', role: 'alert' });
   const form = h('form', {}, h('p', { class: 'quietly' }, words), box, wrong, h('div', { class: 'buttons', style: 'justify-content:end;margin-top:10px' },
     button('Cancel', () => window_.close()), h('button', { class: 'main', type: 'submit' }, title)));
@@ -394,6 +396,7 @@ app.open = (tab) => {
   app.tab = tab;
   for (const each of $('tabs').children) { each.setAttribute('aria-selected', each.dataset.tab === tab); each.tabIndex = each.dataset.tab === tab ? 0 : -1; }
   $('page').replaceChildren(panels[tab].element);
+  $('page').setAttribute('aria-labelledby', `tab-${tab}`);
   app.view.annotate = tab === 'target';
   if (tab !== 'target') app.view.compare = 'physical';
   panels[tab].shown?.();
@@ -404,7 +407,7 @@ app.open = (tab) => {
 };
 function tabs() {
   Object.entries(NAMES).forEach(([key, name], k) => $('tabs').append(
-    h('button', { role: 'tab', type: 'button', 'data-tab': key, onclick: () => app.open(key), tip: `Key ${k + 1}` }, name)));
+    h('button', { role: 'tab', type: 'button', id: `tab-${key}`, 'aria-controls': 'page', 'data-tab': key, onclick: () => app.open(key), tip: `Key ${k + 1}` }, name)));
   $('tabs').addEventListener('keydown', (event) => {
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (!step) return;

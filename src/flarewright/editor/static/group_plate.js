@@ -34,8 +34,9 @@ export function plateGroup(app) {
     // the flare stays as bright as it was over the plate
     if (wasLit && !app.state.plate) app.setView({ exposure_stops: view.plate_stops });
   }
+  const none = button('None', remove, { id: 'plate-none', tip: 'Remove the plate.' });
   const files = h('div', { class: 'row', tip: 'A photograph, or a frame of a film, under the flare: EXR, TIFF, PNG, JPEG. It can also be dropped on the page, or opened by its path. A render draws the flare alone.' }, h('label', {}, 'Picture'),
-    h('div', { class: 'fields' }, button('Choose…', () => picker.click(), { id: 'plate-choose' }), button('None', remove, { id: 'plate-none' }), name, picker));
+    h('div', { class: 'fields' }, button('Choose…', () => picker.click(), { id: 'plate-choose' }), none, name, picker));
   const search = (values, held = '') => { outlines = true; return app.lively('set_plate', { values: { search: values } }, held); };
   const at = (s) => s.plate?.search ?? {};
   const exposure = slider({ label: 'Its brightness', tip: 'Exposure of the plate, in stops. When its lights are found, the exposure above the picture serves both.', min: -8, max: 8, step: 0.1, digits: 1, unit: 'stops', name: 'plate_stops', get: (s) => s.view.plate_stops, set: (plate_stops) => app.setView({ plate_stops }) });
@@ -70,13 +71,13 @@ export function plateGroup(app) {
     else if (outlines && s.plate && found.key === keyOf(s)) words.textContent = `${found.lights.length ? `${found.lights.length} light${found.lights.length > 1 ? 's' : ''} outlined${s.plate.lit ? ', those of the next search' : ''}. ` : ''}${found.words ? sentence(found.words) : ''}`;
     else words.textContent = s.plate?.lit ? 'The lights are those of the plate; the flare has its unit. Another f-number or lens keeps them in place.' : '';
   }
-  const all = group('Plate', [{ element: files, update: (s) => { name.textContent = s.plate ? s.plate.image.split(/[\\/]/).pop() : 'drop a photograph here'; name.title = s.plate?.image ?? ''; } }, visible, exposure, threshold, gain, outline, { element: further, update: (s) => more.forEach((one) => one.update(s)) }, buttons, words]);
+  const all = group('Plate', [{ element: files, update: (s) => { name.textContent = s.plate ? s.plate.image.split(/[\\/]/).pop() : 'drop a photograph here'; name.title = s.plate?.image ?? ''; none.disabled = !s.plate; } }, visible, exposure, threshold, gain, outline, { element: further, update: (s) => more.forEach((one) => one.update(s)) }, buttons, words]);
   const { update } = all;
   return Object.assign(all, {
     update(s) {
       update(s);
-      const none = !s.plate || Boolean(s.lens.measured);
-      for (const part of [threshold.element, gain.element, outline.element, further, buttons, words]) part.hidden = none;
+      const hidden = !s.plate || Boolean(s.lens.measured);
+      for (const part of [threshold.element, gain.element, outline.element, further, buttons, words]) part.hidden = hidden;
       visible.element.hidden = !s.plate;
       exposure.element.hidden = !s.plate || lit(s);
       tell(s);

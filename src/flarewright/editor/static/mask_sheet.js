@@ -1,5 +1,5 @@
 // The mask editor: draw an iris, white lets light through.
-import { button, dialog, h } from './ui.js';
+import { button, dialog, h, press } from './ui.js';
 
 const SIDE = 512;
 const SHAPES = {
@@ -40,7 +40,7 @@ export function drawMask(use, iris) {
   canvas.addEventListener('pointerdown', (event) => { canvas.setPointerCapture(event.pointerId); last = null; draw(event); });
   canvas.addEventListener('pointermove', (event) => { if (event.buttons) draw(event); });
   const both = [button('Open', () => brush(true), { id: 'mask-open', tip: 'The brush lets light through.' }), button('Block', () => brush(false), { id: 'mask-block', tip: 'The brush stops light.' })];
-  function brush(value) { light = value; both[0].classList.toggle('on', value); both[1].classList.toggle('on', !value); }
+  function brush(value) { light = value; press(both[0], value); press(both[1], !value); }
   brush(true);
   const shapes = Object.entries(SHAPES).map(([name, shape]) => button(name, () => stamp(shape), { 'data-shape': name }));
   const box = dialog('Draw the iris', h('p', { class: 'quietly' }, 'Every ghost becomes an image of it, and the starburst its diffraction. The inscribed circle is the opening of the f-number.'),

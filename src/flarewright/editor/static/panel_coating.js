@@ -1,6 +1,6 @@
 // Coatings: of the whole lens, of one row, and the possible colours of a ghost.
 import { latest } from './api.js';
-import { button, choice, entry, group, h, refill, slider, stroke } from './ui.js';
+import { button, choice, entry, group, h, press, refill, slider, stroke } from './ui.js';
 
 const KNOWN = [['lens', 'as in the lens file'], ['none', 'bare glass'], ['quarter-wave:550', 'quarter wave at 550 nm'], ['quarter-wave:450', 'quarter wave at 450 nm'], ['uncoated-1930s', 'uncoated, 1930s'], ['single-1950s', 'single film, 1950s'], ['early-multicoat', 'early multicoat'], ['modern-broadband', 'modern broadband']];
 const KINDS = [['none', 'bare glass'], ['quarter-wave', 'quarter wave'], ['film', 'free film'], ['uncoated-1930s', 'uncoated, 1930s'], ['single-1950s', 'single film, 1950s'], ['early-multicoat', 'early multicoat'], ['modern-broadband', 'modern broadband']];
@@ -104,7 +104,7 @@ export function coatingPanel(app) {
     update(state) {
       whole.update(state);
       const here = row();
-      refill(rows, surfaces(state).map((each) => button(String(each.row), () => { app.row = each.row; app.panels.coating.update(app.state); }, { kind: each.row === here ? 'on' : '', tip: each.coating || 'no coating' })));
+      refill(rows, surfaces(state).map((each) => press(button(String(each.row), () => { app.row = each.row; app.panels.coating.update(app.state); }, { 'aria-label': `Row ${each.row}`, tip: each.coating || 'no coating' }), each.row === here)));
       for (const part of [kinds, quarter, index, thick, field]) part.update(state);
       const { kind } = worn(state);
       quarter.element.hidden = kind !== 'quarter-wave';

@@ -1,5 +1,5 @@
 // The table of ghosts, and overrides of the chosen one.
-import { button, group, h, row, slider } from './ui.js';
+import { button, group, h, press, row, slider } from './ui.js';
 
 const COLUMNS = [['name', 'Ghost', 'First mirror – second mirror, rows counted from the front.'], ['share', 'Light', 'Its light in the picture, relative to the brightest ghost.'], ['size', 'Size', 'Root mean square radius in the picture, mm.']];
 
@@ -7,7 +7,7 @@ export function ghostPanel(app) {
   let by = 'share';
   let down = true;
   const body = h('tbody');
-  const heads = COLUMNS.map(([key, words, tip]) => h('th', { class: 'sort', scope: 'col', tip, tabindex: 0, style: key === 'share' ? 'text-align:left' : null, onclick: () => order(key), onkeydown: (event) => event.key === 'Enter' && order(key) }, words));
+  const heads = COLUMNS.map(([key, words, tip]) => h('th', { class: 'sort', scope: 'col', tip, tabindex: 0, style: key === 'share' ? 'text-align:left' : null, onclick: () => order(key), onkeydown: (event) => { if (event.key === 'Enter' || event.key === ' ') { event.preventDefault(); order(key); } } }, words));
   const table = h('table', { class: 'ghosts' }, h('thead', {}, h('tr', {}, ...heads, h('th', { scope: 'col' }, 'Override'))), body);
   const reported = h('span');
   const order = (key) => { down = by === key ? !down : key !== 'name'; by = key; draw(); };
@@ -41,7 +41,7 @@ export function ghostPanel(app) {
     const muted = ghost.muted || (solos().length > 0 && !solos().includes(ghost.name));
     const bar = h('span', { class: 'bar' });
     bar.style.width = `${Math.max(1, 110 * Math.sqrt(ghost.share))}px`;
-    const element = h('tr', { class: `${ghost.name === app.ghost ? 'chosen' : ''} ${muted ? 'muted' : ''}`, 'data-ghost': ghost.name, tabindex: 0 },
+    const element = h('tr', { class: `${ghost.name === app.ghost ? 'chosen' : ''} ${muted ? 'muted' : ''}`, 'data-ghost': ghost.name, 'aria-selected': String(ghost.name === app.ghost), tabindex: -1 },
       h('td', {}, ghost.name), h('td', { style: 'text-align:left' }, bar, ` ${(100 * ghost.share).toPrecision(2) < 0.01 ? '<0.01' : Number((100 * ghost.share).toPrecision(2))} %`), h('td', {}, ghost.size.toFixed(2)),
       h('td', {}, ghost.muted ? 'muted' : ghost.gain !== 1 ? `× ${Number(ghost.gain.toPrecision(3))}` : '', white(ghost.tint) ? null : h('i', { class: 'tint', style: `background:${hex(ghost.tint)}`, title: 'tinted' })));
     element.addEventListener('click', () => app.choose(ghost.name === app.ghost ? null : ghost.name));
@@ -51,16 +51,26 @@ export function ghostPanel(app) {
       if (next) { event.preventDefault(); next.focus(); }
     });
     // keyboard focus shows the same outline as the mouse
-    element.addEventListener('focus', () => { if (element.matches(':focus-visible')) app.view.hoverGhost(ghost.name); });
+    element.addEventListener('focus', () => { reached(element); if (element.matches(':focus-visible')) app.view.hoverGhost(ghost.name); });
     element.addEventListener('blur', () => app.view.hoverGhost(null));
     element.addEventListener('pointerenter', () => { element.classList.add('over'); app.view.hoverGhost(ghost.name); });
     element.addEventListener('pointerleave', () => { element.classList.remove('over'); app.view.hoverGhost(null); });
     return element;
   }
+  function reached(element) {
+    for (const each of body.querySelectorAll('[tabindex="0"]')) each.tabIndex = -1;
+    if (element) element.tabIndex = 0;
+  }
   function draw() {
-    heads.forEach((head_, k) => { head_.textContent = COLUMNS[k][1] + (by === COLUMNS[k][0] ? (down ? ' ▾' : ' ▴') : ''); });
+    heads.forEach((head_, k) => {
+      const sorting = by === COLUMNS[k][0];
+      head_.textContent = COLUMNS[k][1] + (sorting ? (down ? ' ▾' : ' ▴') : '');
+      head_.setAttribute('aria-sort', sorting ? (down ? 'descending' : 'ascending') : 'none');
+    });
     const held = document.activeElement?.dataset?.ghost;
     body.replaceChildren(...sorted().map(line));
+    // one stop of the Tab key; arrows step through a zoom's hundreds of ghosts
+    reached([...body.children].find((each) => each.dataset.ghost === app.ghost) ?? body.firstChild);
     // keep the keyboard focus on the ghost when the order changes
     if (held !== undefined) [...body.children].find((each) => each.dataset.ghost === held)?.focus({ preventScroll: true });
     body.querySelector('.chosen')?.scrollIntoView({ block: 'nearest' });
@@ -73,8 +83,8 @@ export function ghostPanel(app) {
       controls.element.hidden = !mine;
       if (mine) controls.update(state);
       solo.disabled = mute.disabled = !app.ghost;
-      solo.classList.toggle('on', Boolean(app.ghost) && state.solo.includes(app.ghost));
-      mute.classList.toggle('on', Boolean(mine?.muted));
+      press(solo, Boolean(app.ghost) && state.solo.includes(app.ghost));
+      press(mute, Boolean(mine?.muted));
       reset.disabled = !state.by_hand;
       draw();
     },

@@ -9,6 +9,8 @@ export function irisPanel(app) {
   const mask = h('span', { class: 'quietly below' });
   const picker = h('input', { type: 'file', accept: '.png,.exr', hidden: true });
   picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0], 'mask'); picker.value = ''; });
+  const noMask = button('None', () => { const turned = app.state.iris.turned_before_mask; set({ mask: null, ...(turned === null ? {} : { rotation_deg: turned }) }); }, { id: 'mask-none' });
+  const noDrawing = button('None', () => dirt({ image: null }));
   const dirty = h('span', { class: 'quietly below' });
   const dirtPicker = h('input', { type: 'file', accept: '.png,.exr', hidden: true, name: 'dirt_image' });
   dirtPicker.addEventListener('change', async () => { if (dirtPicker.files[0]) await app.importFile(dirtPicker.files[0], 'dirt'); dirtPicker.value = ''; });
@@ -26,7 +28,7 @@ export function irisPanel(app) {
       slider({ label: 'Rotation', tip: 'Rotates the blades or the mask counter-clockwise; ghosts and spikes rotate with it, inverted ghosts upside down.', min: -180, max: 180, step: 1, digits: 0, unit: '°', name: 'rotation', get: (s) => s.iris.rotation_deg, set: (rotation_deg, held) => set({ rotation_deg }, held) }),
       slider({ label: 'Rounding', tip: 'Curvature of the blades: 0 is straight edges with sharp spikes, 1 a full circle without spikes.', min: 0, max: 1, step: 0.01, name: 'rounding', get: (s) => s.iris.rounding, set: (rounding, held) => set({ rounding }, held) }),
       slider({ label: 'Rough edges', tip: 'Deviation of the edges from their line: it frays the spikes of the starburst.', min: 0, max: 100, step: 1, digits: 0, curve: 2, unit: 'µm', get: (s) => s.iris.roughness_um, set: (roughness_um, held) => set({ roughness_um }, held) }),
-      row('Mask', 'A grey picture instead of blades, where white lets light through: every ghost becomes an image of it.', [button('Draw…', () => drawMask((file) => app.importFile(file, 'mask'), app.state.iris), { id: 'mask-draw' }), button('Load…', () => picker.click(), { id: 'mask-load' }), button('None', () => { const turned = app.state.iris.turned_before_mask; set({ mask: null, ...(turned === null ? {} : { rotation_deg: turned }) }); }, { id: 'mask-none' }), mask, picker], (s) => { mask.textContent = s.iris.mask ? `${s.iris.mask.split(/[\\/]/).pop()}, instead of blades${s.iris.rotation_deg ? `, rotated by ${Number(s.iris.rotation_deg.toFixed(1))}°` : ''}` : ''; }),
+      row('Mask', 'A grey picture instead of blades, where white lets light through: every ghost becomes an image of it.', [button('Draw…', () => drawMask((file) => app.importFile(file, 'mask'), app.state.iris), { id: 'mask-draw' }), button('Load…', () => picker.click(), { id: 'mask-load' }), noMask, mask, picker], (s) => { noMask.disabled = !s.iris.mask; mask.textContent = s.iris.mask ? `${s.iris.mask.split(/[\\/]/).pop()}, instead of blades${s.iris.rotation_deg ? `, rotated by ${Number(s.iris.rotation_deg.toFixed(1))}°` : ''}` : ''; }),
     ]),
     group('Dirt', [
       slider({ label: 'Dust', name: 'dust', tip: 'Opaque grains per mm² in the plane of the stop: each diffracts light into a wide, faint disc.', min: 0, max: 20, step: 0.05, curve: 2, get: (s) => s.dirt.dust_per_mm2, set: (dust_per_mm2, held) => dirt({ dust_per_mm2 }, held) }),
@@ -36,7 +38,7 @@ export function irisPanel(app) {
       entry({ label: 'Scratch length', tip: 'Mean length; short scratches make wide streaks.', unit: 'mm', name: 'scratch_mm', needed: 'needs a number', get: (s) => s.dirt.scratch_mm, set: (scratch_mm) => dirt({ scratch_mm }) }),
       slider({ label: 'Fingerprint', tip: 'Fraction of the light that the ridges of one fingerprint absorb.', min: 0, max: 1, step: 0.01, get: (s) => s.dirt.fingerprint, set: (fingerprint, held) => dirt({ fingerprint }, held) }),
       slider({ label: 'Seed', tip: 'Another number gives another distribution of dirt.', min: 0, max: 100, step: 1, digits: 0, get: (s) => s.dirt.seed, set: (seed, held) => dirt({ seed }, held) }),
-      row('Drawing', 'A grey picture of dirt over the opening, where white lets light through.', [button('Load…', () => dirtPicker.click(), { id: 'dirt-load' }), button('None', () => dirt({ image: null })), dirty, dirtPicker], (s) => { dirty.textContent = s.dirt.image ? s.dirt.image.split(/[\\/]/).pop() : ''; }),
+      row('Drawing', 'A grey picture of dirt over the opening, where white lets light through.', [button('Load…', () => dirtPicker.click(), { id: 'dirt-load' }), noDrawing, dirty, dirtPicker], (s) => { noDrawing.disabled = !s.dirt.image; dirty.textContent = s.dirt.image ? s.dirt.image.split(/[\\/]/).pop() : ''; }),
       tick({ label: 'Also in ghosts', tip: 'Dirt at the stop also casts shadows inside the ghosts, as each ghost is an image of the stop.', get: (s) => s.dirt.in_ghosts, set: (in_ghosts) => dirt({ in_ghosts }) }),
     ]),
     group('Starburst', [

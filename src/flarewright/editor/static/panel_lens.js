@@ -65,7 +65,7 @@ export function lensPanel(app) {
     const guess = column === 'semi_diameter' && line.estimated;
     // round an estimate to the digits that fit
     const value = guess ? Number(line[column]).toFixed(2) : line[column] ?? '';
-    const box = h('input', { type: 'text', value, tip: note, class: `${note ? 'note' : ''} ${guess ? 'guess' : ''}`, 'aria-label': `row ${line.row} ${column}`, 'data-row': line.row, 'data-column': column, spellcheck: 'false', list: column === 'glass' ? 'glasses' : null });
+    const box = h('input', { type: 'text', value, tip: note, class: `${note ? 'note' : ''} ${guess ? 'guess' : ''}`, 'aria-label': `Row ${line.row}, ${COLUMNS.find(([key]) => key === column)[1]}`, 'data-row': line.row, 'data-column': column, spellcheck: 'false', list: column === 'glass' ? 'glasses' : null });
     if (refused && refused.row === line.row && refused.column === column) { box.value = refused.text; mark(box); }
     box.addEventListener('focus', () => { app.row = line.row; choose(); if (column === 'glass') search(box.value); box.select(); });
     box.addEventListener('input', () => { if (column === 'glass') search(box.value); });

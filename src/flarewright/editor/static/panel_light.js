@@ -3,7 +3,7 @@ import { holdoutGroup } from './group_holdout.js';
 import { pathGroup } from './group_path.js';
 import { plateGroup } from './group_plate.js';
 import { ofLens } from './of_lens.js';
-import { button, choice, entry, group, h, refill, row, slider, tick } from './ui.js';
+import { button, choice, entry, group, h, press, refill, row, slider, tick } from './ui.js';
 
 const SPECTRA = [['d65', 'Daylight D65'], ['equal-energy', 'Equal energy'], ['black-body:3200', 'Tungsten 3200 K'], ['black-body:5600', 'Black body 5600 K'], ['black-body:2000', 'Candle 2000 K'], ['lines:589*1,589.6*1', 'Sodium lamp'], ['rgb:1,0.25,0.1', 'Red light'], ['rgb:0.15,0.4,1', 'Blue light']];
 const SENSORS = [['', '36 mm wide'], ['36x24', 'Full frame 36 × 24'], ['24.89x18.66', 'Super 35 4-perf'], ['23.6x15.7', 'APS-C'], ['17.3x13', 'Four Thirds'], ['54.12x25.58', 'Large format 65'], ['43.8x32.9', 'Medium 44 × 33']];
@@ -18,9 +18,6 @@ function sensorOf({ sensor_mm: own, size_px: size }) {
   return known ? known[0] : own.join(' × ');
 }
 const fitted = (key, size) => cropped(pair(key), size).map((mm) => Number(mm.toFixed(3)));
-
-// found lights have numbers, as there may be many
-const labelOf = (light, k, state) => (/^plate-\d+$/.test(light.name) && state.plate?.lit ? String(k + 1) : light.name === 'light' ? `Light ${k + 1}` : light.name.charAt(0).toUpperCase() + light.name.slice(1));
 
 export function lightPanel(app) {
   const one = (state) => state.lights[app.light];
@@ -81,8 +78,8 @@ export function lightPanel(app) {
   return {
     element: h('div', {}, lights.element, plate.element, path.element, shot.element, seeing.element, hiding.element, work.element),
     update(state) {
-      refill(choose, [...state.lights.map((light, k) => button(labelOf(light, k, state), () => { app.chooseLight(k); app.panels.light.update(app.state); app.view.redraw(); }, { kind: k === app.light ? 'on' : '', tip: 'Choose the light for the controls below, the arrow keys and drags in the picture.' })),
-        button('+', () => app.command('add_light', {}).then(() => { app.chooseLight(app.state.lights.length - 1); app.view.redraw(); }).catch(() => {}), { id: 'light-add', kind: 'quiet', tip: 'Add a light.' }),
+      refill(choose, [...state.lights.map((light, k) => press(button(light.label, () => { app.chooseLight(k); app.panels.light.update(app.state); app.view.redraw(); }, { tip: 'Choose the light for the controls below, the arrow keys and drags in the picture.' }), k === app.light)),
+        button('+', () => app.command('add_light', {}).then(() => { app.chooseLight(app.state.lights.length - 1); app.view.redraw(); }).catch(() => {}), { id: 'light-add', kind: 'quiet', 'aria-label': 'Add a light', tip: 'Add a light.' }),
         button('Remove', () => app.command('remove_light', { light: app.light }).catch(() => {}), { kind: 'quiet', disabled: state.lights.length < 2, tip: 'Remove the chosen light; the last one cannot be removed.' })]);
       plainIntensity.element.hidden = Boolean(state.plate?.lit);
       litIntensity.element.hidden = !plainIntensity.element.hidden;

@@ -1,5 +1,5 @@
 // Targets and search: how ghosts should look, and lenses that make them so.
-import { button, choice, entry, group, h, refill, row, slider, tick, toast } from './ui.js';
+import { button, choice, entry, group, h, press, refill, row, slider, tick, toast } from './ui.js';
 
 const COMPARE = [
   ['physical', 'Physical', 'The picture of the present lens (W cycles through these four).'], ['target', 'Target', 'The picture with all targets met, drawn by matrices; no lens makes it yet.'],
@@ -84,17 +84,17 @@ export function targetPanel(app) {
     shown() { if (app.state) app.places?.(); },
     next() { const keys = COMPARE.map(([key]) => key); see(keys[(keys.indexOf(app.view.compare) + 1) % keys.length]); },
     update(state) {
-      for (const look of looks) look.classList.toggle('on', look.dataset.compare === app.view.compare);
+      for (const look of looks) press(look, look.dataset.compare === app.view.compare);
       drawn.hidden = app.view.compare === 'physical';
       drawn.textContent = matrices(state);
       const chosen = app.ghostTarget !== null || Boolean(own());
       reported.textContent = app.ghost && !own() && app.ghostTarget === null ? app.view.unplaced || `Ghost ${app.ghost} reflects on both sides of the stop; design can move those that reflect twice on one side.`
         : chosen ? 'Drag it along the line, or its rim to resize it.' : 'Click a ghost to set its target.';
-      refill(list, (state.design?.ghost_targets ?? []).map((ghostTarget, number) => button(state.design.names[number], () => (ghostTarget.ghost ? app.choose(ghostTarget.ghost) : app.chooseGhostTarget(number)), { kind: (ghostTarget.ghost ? ghostTarget.ghost === app.ghost && app.ghostTarget === null : number === app.ghostTarget) ? 'on' : '' })));
+      refill(list, (state.design?.ghost_targets ?? []).map((ghostTarget, number) => press(button(state.design.names[number], () => (ghostTarget.ghost ? app.choose(ghostTarget.ghost) : app.chooseGhostTarget(number))), ghostTarget.ghost ? ghostTarget.ghost === app.ghost && app.ghostTarget === null : number === app.ghostTarget)));
       fields.element.hidden = !chosen;
       if (chosen) fields.update(state);
-      drop.classList.toggle('on', mine()?.action === 'remove');
-      ignore.classList.toggle('on', mine()?.action === 'ignore');
+      press(drop, mine()?.action === 'remove');
+      press(ignore, mine()?.action === 'ignore');
       drop.disabled = app.ghostTarget !== null;
       back.disabled = !mine();
       clear.disabled = !state.design;

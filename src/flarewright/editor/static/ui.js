@@ -63,7 +63,7 @@ function unread(box, label, kept, needed = '') {
 // A control is {element, update(state)}.
 export function group(title, controls, extra = []) {
   const head = title ? h('h3', {}, title, h('span', { class: 'gap' }), ...extra) : null;
-  const element = h('div', { class: 'group' }, head, ...controls.map((control) => control.element ?? control));
+  const element = h('div', { class: 'group', role: title ? 'group' : null, 'aria-label': title || null }, head, ...controls.map((control) => control.element ?? control));
   return { element, update: (state) => controls.forEach((control) => control.update?.(state)) };
 }
 
@@ -80,6 +80,8 @@ const KEY_STEPS = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, Pag
 // A slider with a number box. `set` receives the value and a group, so that one stroke is one step of the history;
 // `skip` maps a value reached by keys to a valid one; `log`: from `min` to `max` in equal factors.
 export function slider({ label, tip, get, set, min, max, step = 0.01, digits = 2, unit = '', curve = 1, name, skip = (value) => value, log = false }) {
+  // the bar's own value is a part of its length, which says nothing to a screen reader
+  const say = () => bar.setAttribute('aria-valuetext', `${box.value} ${unit}`.trim());
   const to = (value) => (log ? Math.log(Math.max(value, min) / min) / Math.log(max / min) : Math.pow(Math.max(0, (value - min) / (max - min)), 1 / curve));
   const from = (part) => (log ? min * (max / min) ** part : min + (max - min) * Math.pow(part, curve));
   const written = (value) => (log && value !== null ? String(Number(value.toPrecision(3))) : shown(value, digits));
@@ -106,12 +108,14 @@ export function slider({ label, tip, get, set, min, max, step = 0.01, digits = 2
     kept = skip(Math.max(min, Math.min(max, rounded(next))), by);
     bar.value = to(kept);
     box.value = written(kept);
+    say();
     ask(kept, held);
   });
   bar.addEventListener('keyup', () => { held = null; });
   bar.addEventListener('input', () => {
     const value = rounded(from(Number(bar.value)));
     box.value = written(value);
+    say();
     ask(value, held ?? '');
   });
   bar.addEventListener('change', () => { held = null; });
@@ -124,7 +128,7 @@ export function slider({ label, tip, get, set, min, max, step = 0.01, digits = 2
     if (asked || !reported) return;
     kept = get(reported);
     if (!bar.matches(':active')) bar.value = to(kept ?? min);
-    if (document.activeElement !== box) box.value = written(kept);
+    if (document.activeElement !== box) { box.value = written(kept); say(); }
   }
   return row(label, tip, [bar, box, h('span', { class: 'unit' }, unit)], (state) => { reported = state; show(); });
 }
@@ -190,6 +194,13 @@ export function tick({ label, tip, get, set, name, off = () => '' }) {
 
 export const button = (words, work, { tip, kind = '', ...rest } = {}) =>
   h('button', { class: kind, tip, onclick: work, type: 'button', ...rest }, words);
+
+// Show whether a button is on, to eyes and to screen readers.
+export function press(element, on) {
+  element.classList.toggle('on', on);
+  element.setAttribute('aria-pressed', on);
+  return element;
+}
 
 export function dialog(title, ...content) {
   const box = h('dialog', { 'aria-label': title }, h('h2', {}, title), ...content);
@@ -260,9 +271,9 @@ export function tips() {
   });
   const hide = () => { clearTimeout(timer); box.hidden = true; };
   addEventListener('pointerdown', hide);
-  addEventListener('focusout', hide);
+  addEventListener('focusout', (event) => { hide(); event.target.removeAttribute('aria-describedby'); });
   addEventListener('focusin', (event) => {
     const element = event.target.matches(':focus-visible') ? event.target.closest('[data-tip]') : null;
-    if (element) show(element); else box.hidden = true;
+    if (element) { show(element); event.target.setAttribute('aria-describedby', box.id); } else box.hidden = true;
   });
 }
