@@ -5,13 +5,14 @@ the right of an edge is an exact integral, so no polygon is too thin or too smal
 edge add up without a seam.
 """
 
-from math import floor, sqrt
+from math import floor, prod, sqrt
 
 import numpy as np
 
 from ..jit.decorators import borrowing, compiled, inlined
 from ..jit.simd import LANES, add_colored, fetch
 from ..tracing.clip import PX, PY
+from .plane_memory import black_memory
 from .stop_pattern import OPEN, WAY, weave
 
 # a row of the picture is stored in blocks of this many pixels, each channel separately: one vector to the compiler
@@ -42,7 +43,8 @@ def blank_plane(width, height):
     -------
     ndarray of float32, of `plane_shape`
     """
-    return np.zeros(plane_shape(width, height), dtype=np.float32)
+    shape = plane_shape(width, height)
+    return black_memory(prod(shape)).reshape(shape)
 
 
 def to_pixels(plane, width):

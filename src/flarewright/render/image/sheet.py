@@ -7,6 +7,7 @@ from math import prod
 
 import numpy as np
 
+from ...kernels.raster.plane_memory import black_memory
 from ...kernels.raster.polygons import BLOCK, plane_shape, to_pixels
 from ...typing import Pixels
 from .canvas import DETAILS, Canvas, lit_window
@@ -35,7 +36,7 @@ class Sheet:
         shape = plane_shape(*size_px)
         count = prod(shape)
         if self.memory[0].size < count:
-            self.memory[0] = np.zeros(count, dtype=np.float32)
+            self.memory[0] = black_memory(count)
         return Canvas(size_px, [self.memory[0][:count].reshape(shape), *[None] * (DETAILS - 1)])
 
     def lift(self, canvas: Canvas) -> tuple[Pixels, tuple[int, int]]:

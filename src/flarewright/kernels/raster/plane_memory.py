@@ -1,0 +1,41 @@
+"""Memory of large planes.
+
+Rows of a plane lie kilobytes apart, so with pages of 4 kB a triangle touches another page in each of its rows. And what
+the system maps for one plane returns to it when the plane is gone, while the C library may keep it: a tenth of the peak
+of a large frame.
+"""
+
+from __future__ import annotations
+
+import mmap
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# smaller planes fit into few pages
+_LEAST_BYTES = 4 * 2**20
+
+
+def black_memory(count: int) -> NDArray[np.float32]:
+    """Return zeros, for a large plane in huge pages of its own where the system has them (Linux).
+
+    Parameters
+    ----------
+    count : int
+        Number of floats.
+
+    Returns
+    -------
+    ndarray of float32, shape (count,)
+    """
+    # typed as Any: only some systems have these names
+    system: Any = mmap
+    if 4 * count < _LEAST_BYTES or not hasattr(system, "MADV_HUGEPAGE"):
+        return np.zeros(count, dtype=np.float32)
+    block = system.mmap(-1, 4 * count, flags=system.MAP_PRIVATE | system.MAP_ANONYMOUS)
+    # a system without huge pages refuses; small pages do as well
+    with suppress(OSError):
+        block.madvise(system.MADV_HUGEPAGE)
+    return np.frombuffer(block, dtype=np.float32, count=count)
