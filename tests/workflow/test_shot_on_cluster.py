@@ -11,8 +11,9 @@ import time
 from pathlib import Path
 
 import pytest
+from moving_shot import LAST, contents, project
 
-from flarewright import Camera, Light, LightKey, Output, Project, Quality, dataset, shot
+from flarewright import dataset, shot
 from flarewright.io.project.project_text import project_text
 from flarewright.model.project.dataset import DatasetSpec
 
@@ -20,27 +21,11 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX"),
 ]
-LAST = 24
 
 
 @pytest.fixture(autouse=True)
 def _with_dask():
     pytest.importorskip("distributed", reason="needs the extra cluster")
-
-
-def project():
-    path = (LightKey(at_s=0.0, field_deg=(-6.0, 3.0)), LightKey(at_s=1.0, field_deg=(6.0, 3.0)))
-    return Project(
-        lens="heliar-tronnier", f_number=16, lights=[Light(field_deg=(5.0, 5.0), keyframes=path)],
-        camera=Camera(size_px=(320, 180)), quality=Quality(mode="draft", wavelengths=3),
-        output=Output(layers="ghosts", brightest=3, starburst=False),
-    )  # fmt: skip
-
-
-def contents(folder):
-    return {
-        path.relative_to(folder).as_posix(): path.read_bytes() for path in Path(folder).rglob("*") if path.is_file()
-    }
 
 
 def workers():

@@ -11,28 +11,22 @@ import time
 from pathlib import Path
 
 import pytest
+from moving_shot import LAST, contents, project
 
-from flarewright import Camera, Light, LightKey, Output, Project, Quality, shot
+from flarewright import shot
 
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX"),
 ]
-LAST = 24
 FARM = 'jobs = 2\ncores = 1\nmemory = "2GB"\nwalltime = "00:10:00"\n'
 
 
 def draw(folder, **more):
     """Draw the shot into a new folder; return the result and the bytes of its files."""
-    path = (LightKey(at_s=0.0, field_deg=(-6.0, 3.0)), LightKey(at_s=1.0, field_deg=(6.0, 3.0)))
-    project = Project(
-        lens="heliar-tronnier", f_number=16, lights=[Light(field_deg=(5.0, 5.0), keyframes=path)],
-        camera=Camera(size_px=(320, 180)), quality=Quality(mode="draft", wavelengths=3),
-        output=Output(layers="ghosts", brightest=3, starburst=False),
-    )  # fmt: skip
     folder.mkdir()
-    result = shot(project, folder / "f.####.exr", frames=f"1-{LAST}", **more)
-    return result, {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+    result = shot(project(), folder / "f.####.exr", frames=f"1-{LAST}", **more)
+    return result, contents(folder)
 
 
 @pytest.fixture(scope="module")

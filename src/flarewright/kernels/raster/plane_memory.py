@@ -19,7 +19,7 @@ _LEAST_BYTES = 4 * 2**20
 
 
 def black_memory(count: int) -> NDArray[np.float32]:
-    """Return zeros, for a large plane in huge pages of its own where the system has them (Linux).
+    """Return zeros, for a large plane in separate huge pages where the system has them (Linux).
 
     Parameters
     ----------

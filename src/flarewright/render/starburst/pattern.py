@@ -232,12 +232,13 @@ class Painter:
         """
         least = self.inner
         knots = np.geomspace(max(least, 1e-9), max(farthest, 2.0 * least), KNOTS)
-        table = np.einsum("km,mc->kc", value(knots[:, None] / self._scale), self.weights)
+        # multiplied by r^2 the table is nearly constant
+        table = np.einsum("km,mc->kc", value(knots[:, None] / self._scale), self.weights).T * knots**2
+        places = np.log(knots)
 
         def summed(r: Floats) -> Floats:
             at = np.log(np.maximum(r, least))
-            # multiplied by r^2 the table is nearly constant
-            found = [np.interp(at, np.log(knots), column * knots**2) for column in table.T]
+            found = [np.interp(at, places, channel) for channel in table]
             return np.asarray(np.stack(found, axis=-1) / np.maximum(r, least)[..., None] ** 2)
 
         return summed

@@ -156,31 +156,33 @@ def _shape(where: str, kind: str, geometry: Mapping[str, Any], problems: list[st
             )
         return found
     if kind == "ToroidalGeometry":
-        terms = geometry.get("coeffs_poly_y", [])
-        numbers = [json_number(value) for value in terms] if isinstance(terms, list) else [None]
-        if None in numbers or len(numbers) > MOST_TERMS + 1 or any(numbers[:1]):
-            problems.append(
-                f"{where}: its coeffs_poly_y must be numbers of y^2, which must be 0, to y^{2 * MOST_TERMS + 2}"
-            )
         return {
             "curvature": curvature("radius_y"), "conic": conic("conic_yz"), "curvature_x": curvature("radius_x"),
-            "torus": True, "asphere": tuple(value or 0.0 for value in numbers[1 : MOST_TERMS + 1]),
+            "torus": True, "asphere": _terms(where, geometry, "coeffs_poly_y", ("y^2",), "y", problems)[1:],
         }  # fmt: skip
     values: dict[str, Any] = {"curvature": curvature("radius"), "conic": conic("conic")}
     if kind not in ("EvenAsphere", "OddAsphere"):
         return values
-    # the terms that must be 0, and the number of terms for each even one
-    first, step = ("r^2", 1) if kind == "EvenAsphere" else ("r and r^2", 2)
-    terms, last = geometry.get("coefficients", []), step * (MOST_TERMS + 1)
-    numbers = [json_number(value) for value in terms] if isinstance(terms, list) else [None]
-    if None in numbers or len(numbers) > last or any(numbers[:step]):
-        problems.append(
-            f"{where}: its coefficients must be numbers of {first}, which must be 0, to r^{2 * MOST_TERMS + 2}"
-        )
-    values["asphere"] = tuple(value or 0.0 for value in numbers[2 * step - 1 : last : step])
+    zero = ("r^2",) if kind == "EvenAsphere" else ("r", "r^2")
+    terms, step = _terms(where, geometry, "coefficients", zero, "r", problems), len(zero)
+    values["asphere"] = terms[2 * step - 1 :: step]
     if step == 2:
-        values["odd_asphere"] = tuple(value or 0.0 for value in numbers[2:last:2])
+        values["odd_asphere"] = terms[2::2]
     return values
+
+
+def _terms(
+    where: str, geometry: Mapping[str, Any], key: str, zero: tuple[str, ...], variable: str, problems: list[str]
+) -> tuple[float, ...]:  # fmt: skip
+    """Return all coefficients of a sag; the first ones, of the powers `zero`, must be 0."""
+    stated, most = geometry.get(key, []), len(zero) * (MOST_TERMS + 1)
+    numbers = [json_number(value) for value in stated] if isinstance(stated, list) else [None]
+    if None in numbers or len(numbers) > most or any(numbers[: len(zero)]):
+        problems.append(
+            f"{where}: its {key} must be numbers of {' and '.join(zero)}, which must be 0, to "
+            f"{variable}^{2 * MOST_TERMS + 2}"
+        )
+    return tuple(value or 0.0 for value in numbers[:most])
 
 
 def _medium(k: int, material: Mapping[str, Any], problems: list[str], findings: _Findings) -> Medium | None:
