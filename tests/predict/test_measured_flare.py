@@ -10,7 +10,8 @@ import pytest
 
 from flarewright.cli.app import run
 from flarewright.errors import FlarewrightError
-from flarewright.io.measurement.ghost_model_file import is_ghost_model_file, write_ghost_model
+from flarewright.io.files.file_kind import is_ghost_model_file
+from flarewright.io.measurement.ghost_model_file import write_ghost_model
 from flarewright.measure.replay.model_image import light_px, replay_model
 from flarewright.measure.replay.placement import over_clipping
 from flarewright.model.measurement.ghost_model import BezierGhost, GhostModel, Halo, Reference, Star

@@ -70,7 +70,7 @@ def predict(options: PredictOptions) -> None:
         return
     _refuse(_given(options, _OF_SCENE), "a lens or a measured flare", "give a scene file")
     wanted = _wanted(options)
-    from ...io.measurement.ghost_model_file import is_ghost_model_file
+    from ...io.files.file_kind import is_ghost_model_file
     from ...workflow.flare_pictures import pictures_elsewhere
 
     size, folder = _sensor(options.sensor), Path() if options.output is None else options.output.parent

@@ -41,7 +41,7 @@ def init(
     if output is not None:
         check_place(output, ".toml")
         check_free(output, force)
-    from ...io.measurement.ghost_model_file import is_ghost_model_file
+    from ...io.files.file_kind import is_ghost_model_file
     from ...io.project.project_text import project_text
     from ...model import Light
 

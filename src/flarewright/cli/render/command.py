@@ -282,7 +282,7 @@ def _reference_run(options: RenderOptions, project: Project, state: ReferenceSta
 
 def _kept_part(options: RenderOptions, project: Project) -> PartialPicture | None:
     """Return where a final render keeps its finished ghosts; None for the other qualities, and when costs are timed."""
-    from ...io.measurement.ghost_model_file import is_ghost_model_file
+    from ...io.files.file_kind import is_ghost_model_file
 
     if project.quality.mode != "final" or options.profile or is_ghost_model_file(project.lens):
         return None
@@ -320,7 +320,7 @@ def _renderer(
     project: Project, options: RenderOptions, run: ReferenceRun | None, kept: PartialPicture | None
 ) -> Callable[..., Rendering]:
     """Return the render function of a project, of a lens or of a measured flare; it takes a progress callback."""
-    from ...io.measurement.ghost_model_file import is_ghost_model_file
+    from ...io.files.file_kind import is_ghost_model_file
 
     if is_ghost_model_file(project.lens):
         from ...measure.replay.measured_project import render_measured

@@ -33,7 +33,7 @@ def framed(project: Project, flags: RenderOptions) -> tuple[Project, tuple[int, 
     ProjectError
         An option is none, or the lens is a measured flare, whose frame is that of its captures.
     """
-    from ...io.measurement.ghost_model_file import is_ghost_model_file
+    from ...io.files.file_kind import is_ghost_model_file
     from ...io.project.camera_list import camera_format, is_camera_name
     from .project_flags import project_of
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ...errors import ProjectError
-from ...io.measurement.ghost_model_file import is_ghost_model_file
+from ...io.files.file_kind import is_ghost_model_file
 from ...io.project.look_file import read_look
 from ...model import Light, Project
 from ...render.scene.looks import look_keys, with_look

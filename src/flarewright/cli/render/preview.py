@@ -113,7 +113,7 @@ def check_exposure(look: PreviewLook | None, project: Project) -> None:
     FlarewrightError
         In that case, or when the file is no ghost model.
     """
-    from ...io.measurement.ghost_model_file import is_ghost_model_file
+    from ...io.files.file_kind import is_ghost_model_file
 
     if look is None or look.ev is None or not is_ghost_model_file(project.lens):
         return

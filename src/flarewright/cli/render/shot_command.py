@@ -195,7 +195,7 @@ def _over_plate(options: ShotOptions, plate: PlateSettings) -> tuple[ShotOptions
 
 def _squeeze(options: ShotOptions) -> float:
     """Return the squeeze of the options, or of their lens."""
-    from ...io.measurement.ghost_model_file import is_ghost_model_file
+    from ...io.files.file_kind import is_ghost_model_file
     from ...render.scene.resolve import open_lens
 
     if options.squeeze is not None:

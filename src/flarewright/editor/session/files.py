@@ -14,14 +14,13 @@ from ... import __version__
 from ...errors import FlarewrightError, LensError, OutputError, ProjectError, raised_as
 from ...io.files.atomic_write import write_bytes_atomically
 from ...io.files.door import expanded, outside
-from ...io.files.file_kind import LENS_SUFFIXES, kind_of
+from ...io.files.file_kind import LENS_SUFFIXES, is_ghost_model_file, kind_of
 from ...io.files.text_file import read_toml
 from ...io.images.exr import write_exr
 from ...io.images.half import exr_scale
 from ...io.images.plate_picture import PLATE_SUFFIXES
 from ...io.lens.lens_writer import format_lens
 from ...io.lens.library import lens_path, library_name, near_names
-from ...io.measurement.ghost_model_file import is_ghost_model_file
 from ...io.project.look_file import look_text, read_look
 from ...io.project.project_file import project_from_data, read_project
 from ...io.project.project_text import project_text

@@ -6,7 +6,7 @@ Readers call `text_file.read_toml` or `text_file.read_text` and turn validation 
 - `atomic_write`: `write_atomically`, complete files or none; `delete_written`, `make_folder`
 - `door`: `outside`, the one way to a file of the user; `sentences_for`, `refuse_claim`, `expanded`, `shown`
 - `file_lock`: `held`, `locked`, locks between processes
-- `file_kind`: `refuse_other_kind`, errors for a file of another kind than the wanted one
+- `file_kind`: `is_ghost_model_file`, `lens_key`; `refuse_other_kind`, errors for a file of another kind
 - `silence_libraries`: `silenced`, suppresses the output of libraries
 - `state_folder`: `state_folder`, the folder for data that outlives a run
 - `tar_members`: `tar_member`, `join_parts`, tar files joined from parts

@@ -1,4 +1,4 @@
-"""Kind of a TOML file of ours, for error messages about a file given instead of another kind."""
+"""Kinds of files, told by suffix and contents, and errors about a file given instead of another kind."""
 
 from __future__ import annotations
 
@@ -116,3 +116,9 @@ def foreign_hint(text: str) -> str:
             "give it as a lens, as in flarewright lens check FILE"
         )
     return ""
+
+
+def is_ghost_model_file(what: object) -> bool:
+    """Return whether an argument given as a lens is a measured flare: JSON that is no lens of another program."""
+    is_json = isinstance(what, str) and what.lower().endswith(".json") and Path(what).is_file()
+    return is_json and not lens_key(str(what))

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flarewright.errors import FileError, GlassError, LensError, ProjectError
 from flarewright.model import Coating, Iris, Lens, Row, Stop, Surface
@@ -32,23 +32,20 @@ from ..files.text_file import read_bytes, read_toml
 from . import media
 from .coating_text import coating_from
 from .foreign_file import MOST_SURFACES
-from .formats import codev, dotlens, optiland, oslo, realflare, tables
 from .lens_fields import CURVATURE, RADIUS, ROW_NUMBERS, STOP_KEYS, SURFACE_KEYS, TOP_KEYS, TOP_NUMBERS, TOP_TEXTS
 from .scatter_text import read_scatter
 from .shape_fields import read_elements, read_positions, read_shape, unknown_keys
-from .zemax import reader as zemax
 
-_FOREIGN: dict[str, Callable[[str | Path], RawLens | RawSequence]] = {
-    ".lens": dotlens.read_dotlens, ".zmx": zemax.read_zmx, ".len": oslo.read_len, ".dat": tables.read_dat,
-    ".csv": tables.read_csv_table,
-}  # fmt: skip
+if TYPE_CHECKING:
+    from .formats.codev import FirstColumn
+
 # tolerance of a rim beyond the surface's equator, for rounded numbers
 ROUNDED = 1e-6
 # asphere terms that change the rim's height by more than this factor have wrong units
 MOST_LIFTED = 1.0
 
 
-def read_lens(path: str | Path, first_column: codev.FirstColumn | None = None) -> LensReading | RawLens | RawSequence:
+def read_lens(path: str | Path, first_column: FirstColumn | None = None) -> LensReading | RawLens | RawSequence:
     """Read a lens file of any known kind.
 
     Parameters
@@ -73,11 +70,11 @@ def read_lens(path: str | Path, first_column: codev.FirstColumn | None = None) -
     """
     suffix = Path(path).suffix.lower()
     if suffix == ".seq":
-        return codev.read_seq(path, first_column)
-    if (read := _FOREIGN.get(suffix)) is not None:
+        from .formats.codev import read_seq
+
+        return read_seq(path, first_column)
+    if (read := _foreign_reader(suffix, path)) is not None:
         return read(path)
-    if suffix == ".json" and (key := lens_key(path)):
-        return optiland.read_optiland(path) if key == OPTILAND_KEY else realflare.read_realflare(path)
     if suffix == ".toml" or Path(path).is_dir() or not Path(path).exists():
         return read_lens_toml(path)
     with suppress(FileError):
@@ -92,6 +89,33 @@ def read_lens(path: str | Path, first_column: codev.FirstColumn | None = None) -
         f"{path} is of an unknown kind: Flarewright reads .toml (its own), .lens, .zmx, .seq, .len, .dat, .csv and "
         "the .json files of RealFlare and Optiland"
     )
+
+
+def _foreign_reader(suffix: str, path: str | Path) -> Callable[[str | Path], RawLens | RawSequence] | None:
+    """Return the reader of another program's lens file; each is imported only when it reads one."""
+    match suffix:
+        case ".lens":
+            from .formats.dotlens import read_dotlens
+
+            return read_dotlens
+        case ".zmx":
+            from .zemax.reader import read_zmx
+
+            return read_zmx
+        case ".len":
+            from .formats.oslo import read_len
+
+            return read_len
+        case ".dat" | ".csv":
+            from .formats.tables import read_csv_table, read_dat
+
+            return read_dat if suffix == ".dat" else read_csv_table
+        case ".json" if key := lens_key(path):
+            from .formats.optiland import read_optiland
+            from .formats.realflare import read_realflare
+
+            return read_optiland if key == OPTILAND_KEY else read_realflare
+    return None
 
 
 def read_lens_toml(path: str | Path) -> LensReading:

@@ -15,7 +15,6 @@ from ...model.measurement.ghost_tracks import Tracks
 from ...model.measurement.replay_camera import ReplayCamera
 from ...sentences import summary
 from ..files.atomic_write import write_text_atomically
-from ..files.file_kind import lens_key
 from ..files.text_file import LARGEST, check_version, read_json
 from ..files.type_slips import record_of
 
@@ -37,12 +36,6 @@ def _read(path: str | Path, what: str, record: type[Record], largest: int = LARG
     if found is None:
         raise FlarewrightError(summary(str(path), problems), tuple(problems))
     return found
-
-
-def is_ghost_model_file(what: object) -> bool:
-    """Return whether an argument given as a lens is a measured flare: JSON that is no lens of another program."""
-    is_json = isinstance(what, str) and what.lower().endswith(".json") and Path(what).is_file()
-    return is_json and not lens_key(str(what))
 
 
 def read_ghost_model(path: str | Path) -> GhostModel:

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import ProjectError
-from ...io.measurement.ghost_model_file import is_ghost_model_file, read_ghost_model
+from ...io.files.file_kind import is_ghost_model_file
+from ...io.measurement.ghost_model_file import read_ghost_model
 from ...model import D65, Camera, Layer, Light, Project
 from ...model.measurement.ghost_model import GhostModel
 from ...model.measurement.replay_camera import ReplayCamera

@@ -6,7 +6,7 @@ from os import PathLike
 from typing import Any
 
 from ...errors import ProjectError
-from ...io.measurement.ghost_model_file import is_ghost_model_file
+from ...io.files.file_kind import is_ghost_model_file
 from ...io.project.look_file import read_look
 from ...model import Art, Bare, Camera, Everywhere, InTurn, Iris, Light, Look, Preset, Project
 from ...model.project.look import CAMERA_KEYS, LIGHT_KEYS

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import hypot
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ...errors import GlassError, LensError, ProjectError, naming
 from ...io.images.height_image import read_heights
-from ...io.lens.formats.codev import FirstColumn
 from ...io.lens.library import in_library, lens_path
 from ...io.lens.media import attach
 from ...io.lens.media import complete_medium as complete_media
@@ -26,6 +26,9 @@ from ...optics.lens_import.semi_diameters import with_semi_diameters
 from ...optics.lens_import.sequential_import import lens_of_sequence
 from ...optics.rays.pack import SensorMirror, resolve_coatings
 from ...sentences import INVALID, summary, validation_sentences
+
+if TYPE_CHECKING:
+    from ...io.lens.formats.codev import FirstColumn
 
 
 @dataclass(frozen=True)
