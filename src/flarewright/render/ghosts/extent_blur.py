@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TypeVar
 
 import numpy as np
@@ -17,6 +18,8 @@ _Light = TypeVar("_Light", Pixels, Floats)
 
 # kernels of more taps are applied by a Fourier transform
 MOST_TAPS = 600
+# rows that are spread tap by tap at once
+BAND_ROWS = 64
 
 
 def blur_by_extent(picture: NDArray[np.floating], kernel: Floats) -> Floats:
@@ -78,12 +81,39 @@ def spread_window(
     corner : tuple of int
         Column and row of its first pixel.
     """
-    part, landed, shape = _landing(light.shape[1::-1], corner, size_px, kernel)
+    _, (left, top), shape = _landing(light.shape[1::-1], corner, size_px, kernel)
     out = np.zeros((*shape, light.shape[2]), dtype=np.float32)
+    for band, (_, y) in spread_bands(light, corner, size_px, kernel):
+        if len(band) == len(out):
+            return band, (left, top)
+        out[y - top : y - top + len(band)] = band
+    return out, (left, top)
+
+
+def spread_bands(
+    light: Pixels, corner: tuple[int, int], size_px: tuple[int, int], kernel: Floats
+) -> Iterator[tuple[Pixels, tuple[int, int]]]:
+    """As `spread_window`, but in bands of rows, so that no second picture is in memory.
+
+    Yields
+    ------
+    light : ndarray, shape (R, W', C), float32
+        Of `BAND_ROWS` rows, fewer at the end; of all rows where a Fourier transform spreads them.
+    corner : tuple of int
+        Column and row of its first pixel.
+    """
+    (rows, columns), (x, y), (height, width) = _landing(light.shape[1::-1], corner, size_px, kernel)
     if np.count_nonzero(kernel) > MOST_TAPS:
-        return _convolved(light, kernel, part, out), landed
-    spread_taps(np.ascontiguousarray(light), kernel.astype(np.float32), part[0].start, part[1].start, out)
-    return out, landed
+        yield _convolved(light, kernel, (rows, columns), np.empty((height, width, light.shape[2]), np.float32)), (x, y)
+        return
+    taps = kernel.astype(np.float32)
+    for top in range(0, height, BAND_ROWS):
+        band = np.zeros((min(BAND_ROWS, height - top), width, light.shape[2]), dtype=np.float32)
+        # the rows of which a tap lands in the band
+        first = max(rows.start + top - len(taps) + 1, 0)
+        near = np.ascontiguousarray(light[first : rows.start + top + len(band)])
+        spread_taps(near, taps, rows.start + top - first, columns.start, band)
+        yield band, (x, y + top)
 
 
 def placed(light: _Light, corner: tuple[int, int], size_px: tuple[int, int]) -> _Light:

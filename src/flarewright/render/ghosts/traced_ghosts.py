@@ -37,7 +37,7 @@ from ..scene.path_color import traced_spectrum, visible_rays
 from ..scene.shot import Shot, at_fine_wavelengths
 from .art_filters import coarseness, filtered_ghost
 from .cost import IDLE, CostMeter, Watch
-from .extent_blur import placed, shape_kernel, spread_window
+from .extent_blur import placed, shape_kernel, spread_bands, spread_window
 from .final_pass import FinalPass
 from .steep_ghosts import bent_spectrum, steepness
 from .wavelength_subset import gathered_weights
@@ -442,11 +442,13 @@ def draw_alone(
         visible = edge_contrast(item, level)
         draw_final(own_item, quality, apart, visible, stop=stop, around=beside, detail=0, costs=costs)
     light, corner = sheet.lift(apart)
+    if not art.alone:
+        lit = [(light, corner)] if kernel is None else spread_bands(light, corner, apart.size_px, kernel)
+        for band, place in lit:
+            canvas.add(band, detail, place)
+        return
     if kernel is not None:
         light, corner = spread_window(light, corner, apart.size_px, kernel)
-    if not art.alone:
-        canvas.add(light, detail, corner)
-        return
     # filters take the picture with its margin
     pixels = placed(light, corner, (width + 2 * art_margin[0], height + 2 * art_margin[1]))
     canvas.add(filtered_ghost(pixels, art, frame, items[0].to_pixels / 2.0**detail, own), detail)
