@@ -431,8 +431,10 @@ def _stored(pixels: Pixels, scale: float, half: bool) -> NDArray[Any]:
     # in bands of rows: a few copies of a whole picture cost more time to clear than to fill
     for top in range(0, len(pixels), _BAND):
         rounded = rounded_to_half(pixels[top : top + _BAND] * factor)
-        if np.any(np.abs(rounded) > HALF_MAX):
-            return rounded_to_half(pixels * factor)
+        if stored.dtype == np.float16 and np.any(np.abs(rounded) > HALF_MAX):
+            beyond = np.empty(pixels.shape, np.float32)
+            beyond[:top] = stored[:top]
+            stored = beyond
         stored[top : top + _BAND] = rounded
     return stored
 
