@@ -23,7 +23,8 @@ from typer.main import get_command
 
 import flarewright as fw
 from flarewright import __version__
-from flarewright.cli.app import app, run
+from flarewright.cli.app import run
+from flarewright.cli.command_tree import command_tree
 from flarewright.cli.render import command as render_command
 from flarewright.errors import OutputError
 from flarewright.io.images.exr import read_exr
@@ -388,7 +389,7 @@ def test_ctrl_c_reports_commands_that_resume(capsys, monkeypatch, words, goes_on
     def stopped(**_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("flarewright.cli.app.app", stopped)
+    monkeypatch.setattr("flarewright.cli.app.command_tree", lambda words: stopped)
     assert run(words.split()) == 130
     more = ", and the same command resumes" if goes_on else ""
     assert capsys.readouterr().err == f"flarewright: interrupted; nothing was left half-written{more}\n"
@@ -398,7 +399,7 @@ def test_ctrl_c_reports_the_flag_that_a_command_lacked_to_resume(capsys, monkeyp
     def stopped(**_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("flarewright.cli.app.app", stopped)
+    monkeypatch.setattr("flarewright.cli.app.command_tree", lambda words: stopped)
     assert run(["design", "benchmark", "heliar"]) == 130
     assert capsys.readouterr().err.endswith("; with --report or --picture the same command would resume\n")
 
@@ -687,7 +688,7 @@ def test_help_keeps_its_square_brackets(capsys):
         for each in getattr(command, "commands", {}).values():
             yield from texts(each)
 
-    for text in filter(None, texts(get_command(app))):
+    for text in filter(None, texts(get_command(command_tree()))):
         assert from_markup(text).plain == text.replace("\\[", "[")
     assert "flarewright[ui]" in call(capsys, "edit", "--help").out
 

@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 from typer.main import get_command
 
-from flarewright.cli.app import app, run
+from flarewright.cli.app import run
+from flarewright.cli.command_tree import command_tree
 from flarewright.cli.render.options.record import RenderOptions
 from flarewright.cli.render.project_flags import _OPTION_OF, _SECTIONS
 from flarewright.model import Light, Project
@@ -23,7 +24,7 @@ def options(command: Any, name: str = "flarewright") -> dict[str, Any]:
 
 
 def test_every_option_says_what_it_takes():
-    found = options(get_command(app))
+    found = options(get_command(command_tree()))
     assert len(found) > 200
     assert [name for name, option in found.items() if option.metavar is None] == []
     assert found["flarewright render --fstop"].metavar == "NUMBER"
@@ -57,7 +58,9 @@ def test_a_value_of_another_kind_is_reported_in_words(capsys, words, said):
 
 @pytest.mark.parametrize(("name", "said"), [("", "is empty"), ("a\0.exr", "has a null byte")])
 def test_every_output_refuses_what_is_no_name(capsys, name, said):
-    commands = [name.split()[1:-1] for name, option in options(get_command(app)).items() if "--output" in option.opts]
+    commands = [
+        name.split()[1:-1] for name, option in options(get_command(command_tree())).items() if "--output" in option.opts
+    ]
     assert len(commands) > 20
     for words in commands:
         assert run([*words, "-o", name]) == 2

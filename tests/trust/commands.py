@@ -9,7 +9,7 @@ from typing import Any, get_type_hints
 import typer
 from typer.models import ArgumentInfo, OptionInfo
 
-from flarewright.cli.app import app
+from flarewright.cli.command_tree import command_tree
 from flarewright.cli.option_words import types_within
 
 SMALL = ("--threads", "1")
@@ -87,7 +87,7 @@ LEFT_OUT = {"edit", "warm-up"}
 
 def commands() -> Iterator[tuple[str, Any]]:
     """Yield the name and the function of each command."""
-    yield from _below(app, ())
+    yield from _below(command_tree(), ())
 
 
 def _below(group: typer.Typer, path: tuple[str, ...]) -> Iterator[tuple[str, Any]]:

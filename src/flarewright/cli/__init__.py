@@ -5,7 +5,8 @@ thread: the program has its own threads, and idle library threads would spin, a 
 Its arrays get no huge pages on Linux: a frame makes gigabytes of short-lived arrays, and the system clears a page of
 4 kB in the cache just before it is filled, but not one of 2 MB.
 
-- `app`: `main` and `run`: the command tree, errors and exit codes
+- `app`: `main` and `run`: errors and exit codes
+- `command_tree`: `command_tree`, `COMMANDS`: which function runs each command
 - `common`: helpers of several commands: option values, output checks, remarks, JSON, progress bars
 - `progress_lines`: `ProgressLines`, progress as lines of JSON
 - `option_record`: `with_options`, commands whose options are the fields of a record

@@ -1,4 +1,4 @@
-"""The command tree `flarewright COMMAND`. Commands import their modules when they run, so that help is instant."""
+"""Run a command line: errors and exit codes. Commands import their modules when they run, so that help is instant."""
 
 from __future__ import annotations
 
@@ -10,50 +10,14 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from mmap import mmap
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
-from .. import __version__
 from ..errors import FlarewrightError
 from ..kernels.jit.warmup_processes import head_start
-from . import dataset, edit, gallery, looks, warm_up
+from .command_tree import GROUPS, command_tree
 from .common import end_as_interrupted, end_at_once, was_interrupted
-from .design import benchmark as design_benchmark
-from .design import colors as design_colors
-from .design import edit as design_edit
-from .design import identify as design_identify
-from .design import scratch as design_scratch
-from .design import solve as design_solve
-from .design import target as design_target
-from .lens import cameras, coating_list, coating_plot, lenses
-from .lens import check as lens_check
-from .lens import convert as lens_convert
-from .lens import schema as lens_schema
-from .lens import show as lens_show
-from .library import add as library_add
-from .library import listing as library_list
-from .library import remove as library_remove
-from .library import search as library_search
-from .library import show as library_show
-from .library import thumbnails as library_thumbnails
-from .measure import explain as measure_explain
-from .measure import replay as measure_replay
-from .measure import report as measure_report
-from .measure import run as measure_run
-from .measure import stages as measure_stages
-from .option_words import name_values
-from .predict import command as predict
-from .project import check as project_check
-from .project import init as project_init
-from .project import scene_check, scene_init, scene_schema
-from .project import schema as project_schema
-from .render import command as render
-from .render import film_command as film
-from .render import ghosts_command as ghosts
-from .render import nuke_command as nuke
-from .render import shot_command as shot
-from .render import sources_command as sources
 
 # messages of older releases of Typer on option values
 _TYPES = {"is not a valid float": "is no number", "is not a valid integer": "is no whole number"}
@@ -63,102 +27,6 @@ _NO_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start ne
 _SPARE_BYTES = 64_000_000
 # largest number of errors of a file that are listed
 _REPORTED = 20
-
-app = typer.Typer(
-    name="flarewright",
-    help="Physical lens flare: choose a lens and a light, get a layered linear picture.",
-    epilog="Start with: flarewright lenses\n\nThen: flarewright render takumar-50-f1.4 --light -9,5 -o flare.exr",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-lens_app = typer.Typer(help="Show, check and convert lens files.")
-library_app = typer.Typer(help="Your own library of lenses: add files, search, use them by name.")
-looks_app = typer.Typer(help="Looks: coatings, iris, dirt and colours together, for any lens and light.")
-coating_app = typer.Typer(help="List standard coatings, and plot the reflectance of any coating.")
-project_app = typer.Typer(help="Project files: everything a render needs, in one TOML file.")
-scene_app = typer.Typer(help="Scene files: cameras and lights in space, for `flarewright predict`.")
-design_app = typer.Typer(help="Search lenses for a target flare.")
-measure_app = typer.Typer(help="Measure a real camera's flare and replay it.")
-
-app.command("render", epilog=render.EPILOG)(render.render)
-app.command("shot", epilog=shot.EPILOG)(shot.shot)
-app.command("film", epilog=film.EPILOG)(film.film)
-app.command("nuke-script", epilog=nuke.EPILOG)(nuke.nuke_script)
-app.command("dataset", epilog=dataset.EPILOG)(dataset.dataset)
-app.command("sources", epilog=sources.EPILOG)(sources.sources)
-app.command("ghosts", epilog=ghosts.EPILOG)(ghosts.ghosts)
-app.command("predict", epilog=predict.EPILOG)(predict.predict)
-app.command("lenses", epilog=lenses.EPILOG)(lenses.lenses)
-app.command("cameras", epilog=cameras.EPILOG)(cameras.cameras)
-app.command("gallery", epilog=gallery.EPILOG)(gallery.gallery)
-app.command("edit", epilog=edit.EPILOG)(edit.edit)
-app.command("warm-up", epilog=warm_up.EPILOG)(warm_up.warm_up)
-app.add_typer(lens_app, name="lens")
-app.add_typer(library_app, name="library")
-app.add_typer(looks_app, name="looks")
-looks_app.callback(invoke_without_command=True, epilog=looks.EPILOG)(looks.looks)
-looks_app.command("save", epilog=looks.SAVE_EPILOG)(looks.save)
-app.add_typer(coating_app, name="coating")
-app.add_typer(project_app, name="project")
-app.add_typer(scene_app, name="scene")
-app.add_typer(design_app, name="design")
-app.add_typer(measure_app, name="measure")
-lens_app.command("show", epilog=lens_show.EPILOG)(lens_show.show)
-lens_app.command("check", epilog=lens_check.EPILOG)(lens_check.check)
-lens_app.command("convert", epilog=lens_convert.EPILOG)(lens_convert.convert)
-lens_app.command("schema")(lens_schema.schema)
-library_app.command("add", epilog=library_add.EPILOG)(library_add.add)
-library_app.command("list", epilog=library_list.EPILOG)(library_list.listing)
-library_app.command("search", epilog=library_search.EPILOG)(library_search.search)
-library_app.command("show", epilog=library_show.EPILOG)(library_show.show)
-library_app.command("remove", epilog=library_remove.EPILOG)(library_remove.remove)
-library_app.command("thumbnails", epilog=library_thumbnails.EPILOG)(library_thumbnails.thumbnails)
-coating_app.command("list", epilog=coating_list.EPILOG)(coating_list.listing)
-coating_app.command("plot", epilog=coating_plot.EPILOG)(coating_plot.plot)
-project_app.command("init", epilog=project_init.EPILOG)(project_init.init)
-project_app.command("check")(project_check.check)
-project_app.command("schema")(project_schema.schema)
-scene_app.command("init", epilog=scene_init.EPILOG)(scene_init.init)
-scene_app.command("check")(scene_check.check)
-scene_app.command("schema")(scene_schema.schema)
-
-design_app.command("solve", epilog=design_solve.EPILOG)(design_solve.solve)
-design_app.command("resume")(design_solve.resume)
-design_app.command("target", epilog=design_target.EPILOG)(design_target.target)
-design_app.command("scratch", epilog=design_scratch.EPILOG)(design_scratch.scratch)
-design_app.command("colors", epilog=design_colors.EPILOG)(design_colors.colors)
-design_app.command("resize")(design_edit.resize)
-design_app.command("move-stop")(design_edit.move_stop)
-design_app.command("benchmark", epilog=design_benchmark.EPILOG)(design_benchmark.benchmark)
-design_app.command("identify", epilog=design_identify.EPILOG)(design_identify.identify)
-measure_app.command("run", epilog=measure_run.RUN_EPILOG)(measure_run.run)
-measure_app.command("merge", epilog=measure_run.MERGE_EPILOG)(measure_run.merge_command)
-measure_app.command("find", epilog=measure_stages.FIND_EPILOG)(measure_stages.find)
-measure_app.command("fit", epilog=measure_stages.FIT_EPILOG)(measure_stages.fit)
-measure_app.command("track", epilog=measure_stages.TRACK_EPILOG)(measure_stages.track)
-measure_app.command("compress", epilog=measure_stages.COMPRESS_EPILOG)(measure_stages.compress)
-measure_app.command("explain", epilog=measure_explain.EPILOG)(measure_explain.explain)
-measure_app.command("report", epilog=measure_report.EPILOG)(measure_report.report)
-measure_app.command("replay", epilog=measure_replay.EPILOG)(measure_replay.replay)
-name_values(app)
-
-
-def _version(wanted: bool) -> None:
-    if wanted:
-        typer.echo(f"flarewright {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _root(
-    version: Annotated[
-        bool,
-        typer.Option("--version", metavar="", callback=_version, is_eager=True, help="Print the version and exit."),
-    ] = False,
-) -> None:
-    del version  # The callback has printed it.
 
 
 def main() -> None:
@@ -195,7 +63,7 @@ def run(arguments: Sequence[str]) -> int:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     words = list(arguments)
-    if words in ([], ["lens"], ["library"], ["coating"], ["project"], ["scene"], ["design"], ["measure"]):
+    if not words or (len(words) == 1 and words[0] in GROUPS and words != ["looks"]):
         if not words:
             _show_gallery()
         words.append("--help")
@@ -250,6 +118,7 @@ def _check_threads() -> None:
 def _show_gallery() -> None:
     """Write the gallery of shipped pictures and print its address; do nothing if it cannot be written."""
     from ..io.files.state_folder import state_folder
+    from . import gallery
 
     with suppress(FlarewrightError, OSError):
         page = gallery.shipped_gallery(state_folder() / "gallery")
@@ -272,7 +141,7 @@ def _call(words: list[str]) -> int:
     """Convert every expected end of a command to an exit code, with one sentence on stderr."""
     try:
         with _hiding_interrupts():
-            code: Any = app(args=words, prog_name="flarewright", standalone_mode=False)
+            code: Any = command_tree(words)(args=words, prog_name="flarewright", standalone_mode=False)
     except FlarewrightError as error:
         return _fail(str(error), getattr(error, "problems", ()))
     except KeyboardInterrupt:

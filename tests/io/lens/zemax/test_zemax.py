@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from flarewright.cli.app import app
+from flarewright.cli.command_tree import command_tree
 from flarewright.errors import LensError
 from flarewright.io.lens.foreign_file import decoded
 from flarewright.io.lens.lens_writer import write_lens
@@ -261,13 +261,13 @@ def test_check_and_convert_take_such_files(tmp_path):
     good = write(tmp_path, doublet(gap=80.0))
     bad = write(tmp_path, doublet().replace("SF5 0 0", "MIRROR 0 0"), "bad.zmx")
     runner = CliRunner()
-    checked = runner.invoke(app, ["lens", "check", str(good), str(bad)])
+    checked = runner.invoke(command_tree(), ["lens", "check", str(good), str(bad)])
     assert checked.exit_code == 2
     assert "lens.zmx: usable, Two lenses" in checked.output
     assert "from the paraxial focus" in checked.output
     assert "surface 2 is a mirror" in checked.output
     out = tmp_path / "own.toml"
-    converted = runner.invoke(app, ["lens", "convert", str(good), str(out)])
+    converted = runner.invoke(command_tree(), ["lens", "convert", str(good), str(out)])
     assert converted.exit_code == 0
     lens = read_lens(out).lens
     assert lens.f_number == 4.0
