@@ -228,6 +228,14 @@ TRIALS = {
         ("predict", "heliar-tronnier", "--fstop", "16", "--quality", "draft", "--samples", "9", "--json"),
         ("state/partial/*",), output=str,
     ),
+    "ghosts": Trial(
+        ("ghosts", "heliar-tronnier", "--light", "8,5", "--orders", "4", "--order4-limit", "1e-4", "--csv"),
+        ("state/partial/*",), output=str,
+    ),
+    "ghosts --sweep": Trial(
+        ("ghosts", "heliar-tronnier", "--light", "8,5", "--sweep", "field=0:20:2", "--csv"),
+        ("state/partial/*",), output=str,
+    ),
     "render --quality final": Trial(
         ("render", "canon-28-80", "--light", "10,5", "--light", "-4,3", "--quality", "final", "--size", "480x270",
          "--orders", "4", "--no-png", "-o", "out.exr"),

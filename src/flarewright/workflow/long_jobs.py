@@ -51,6 +51,7 @@ JOBS = (
     LongJob(("measure", "track"), "DIR/track.journal"),
     LongJob(("measure", "compress"), "DIR/compress.journal"),
     LongJob(("measure", "explain"), "DIR/search.json"),
+    LongJob(("ghosts",), "the state folder's `partial`"),
     LongJob(("predict",), "NAME.partial.npz"),
     LongJob(("render",), "NAME.partial, NAME.state.npz", "the same command, or --resume NAME.state.npz"),
     LongJob(("shot",), "the finished frames"),
