@@ -100,13 +100,13 @@ def test_a_file_that_does_not_fit_is_dropped_with_one_sentence(harm, sentence, p
         counted(patch, ghost_table, "_measure", 1)
         printed(*LIGHT, "--csv")
     (kept,) = partial.iterdir()
-    digest, arrays = read_arrays(kept, "", "")
+    about, arrays = read_arrays(kept, "", "")
     if harm == "emptied":
         kept.write_bytes(b"")
     elif harm == "other":
         write_arrays(kept, "other", arrays)
     else:
-        write_arrays(kept, digest, {name: np.append(array, 0.0) for name, array in arrays.items()})
+        write_arrays(kept, about["digest"], {name: np.append(array, 0.0) for name, array in arrays.items()})
     code, found, said = printed(*LIGHT, "--csv")
     assert (code, found) == (0, whole)
     (extra,) = set(said.splitlines()) - set(plain.splitlines())

@@ -17,10 +17,11 @@ from ..optics.rays.pack import SensorMirror
 from ..typing import Progress
 from .analysis_memory import AnalysisMemory, AnalysisPart
 from .image.partial_picture import digest_of
+from .progress_parts import progress_parts
 from .scene.resolve import build, check_opens, open_lens
 
-# part of the work that searches the paths of four reflections
-_SEARCH_PART = 0.1
+# time of the search for paths of four reflections, and of the ghosts
+_WEIGHTS = {"search": 1.0, "ghosts": 9.0}
 
 
 def paraxial(
@@ -177,9 +178,13 @@ def find_ghosts(
         return ghost_table(lens, packed, query, threads=threads, progress=progress, measured=part.rows), ()
     from .reference.four_reflections import find_four_reflections_unbounded
 
-    search, rest = _between(progress, 0.0, _SEARCH_PART), _between(progress, _SEARCH_PART, 1.0)
-    found = find_four_reflections_unbounded(lens, packed, query, threads=threads, progress=search, sums=part.sums)
-    table = ghost_table(lens, packed, query, others=found.paths, threads=threads, progress=rest, measured=part.rows)
+    parts = progress_parts(progress, _WEIGHTS)
+    found = find_four_reflections_unbounded(
+        lens, packed, query, threads=threads, progress=parts["search"], sums=part.sums
+    )
+    table = ghost_table(
+        lens, packed, query, others=found.paths, threads=threads, progress=parts["ghosts"], measured=part.rows
+    )
     # remove the rows below the limit
     two = sum(row.throughput_mm2 for row in table.ghosts if not row.later_reflections)
     rows = [row for row in table.ghosts if not row.later_reflections or row.throughput_mm2 > query.order4_limit * two]
@@ -189,10 +194,3 @@ def find_ghosts(
         f"{share:.1%} of that are not listed"
     )
     return replace(table, ghosts=tuple(rows)), (remark,)
-
-
-def _between(progress: Progress | None, start: float, end: float) -> Progress | None:
-    """Return the callback of a part of the work."""
-    if progress is None:
-        return None
-    return lambda part, words: progress(start + (end - start) * part, words)

@@ -53,11 +53,11 @@ def _read(path: Path, digest: str, report: Report) -> AnalysisMemory:
     if not path.exists():
         return AnalysisMemory()
     try:
-        known, arrays = read_arrays(path, "part of an analysis of ghosts", _REMEDY)
+        about, arrays = read_arrays(path, "part of an analysis of ghosts", _REMEDY)
     except FileError as error:
         report(str(error))
         return AnalysisMemory()
-    if known != digest:
+    if about["digest"] != digest:
         report(f"{path} belongs to other settings; {_REMEDY}")
         return AnalysisMemory()
     try:

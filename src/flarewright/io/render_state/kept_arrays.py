@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,12 @@ from numpy.typing import NDArray
 from ..files.atomic_write import write_atomically
 from ..files.door import outside_arrays
 
-_DIGEST = "digest"
+Arrays = dict[str, NDArray[Any]]
+
+_ABOUT = "about"
 
 
-def write_arrays(path: Path, digest: str, arrays: Mapping[str, NDArray[Any]]) -> None:
+def write_arrays(path: Path, digest: str, arrays: Mapping[str, NDArray[Any]], **facts: int) -> None:
     """Write arrays atomically.
 
     Parameters
@@ -25,23 +28,32 @@ def write_arrays(path: Path, digest: str, arrays: Mapping[str, NDArray[Any]]) ->
     digest : str
         Of everything that determines the arrays.
     arrays : mapping of str to ndarray
-        By any name but "digest".
+        By any name but "about".
+    **facts : int
+        Numbers about them.
 
     Raises
     ------
     OutputError
         When the file cannot be written.
     """
+    about = json.dumps({"digest": digest, **facts})
 
     def write(temporary: Path) -> None:
         # a file object keeps NumPy from adding its own suffix
         with temporary.open("wb") as file:
-            np.savez(file, **{_DIGEST: np.array(digest), **arrays})  # type: ignore[arg-type]
+            np.savez(file, **{_ABOUT: np.array(about), **arrays})  # type: ignore[arg-type]
 
     write_atomically(path, write)
 
 
-def read_arrays(path: Path, what: str, remedy: str) -> tuple[str, dict[str, NDArray[Any]]]:
+def digest_in(path: Path, what: str, remedy: str) -> str:
+    """Return the digest of a file; parameters and errors as of `read_arrays`."""
+    with outside_arrays(path, what, remedy) as archive:
+        return str(json.loads(str(archive[_ABOUT]))["digest"])
+
+
+def read_arrays(path: Path, what: str, remedy: str) -> tuple[dict[str, Any], Arrays]:
     """Read what `write_arrays` wrote.
 
     Parameters
@@ -52,7 +64,8 @@ def read_arrays(path: Path, what: str, remedy: str) -> tuple[str, dict[str, NDAr
 
     Returns
     -------
-    digest : str
+    about : dict
+        "digest", and the facts.
     arrays : dict of str to ndarray
 
     Raises
@@ -61,5 +74,7 @@ def read_arrays(path: Path, what: str, remedy: str) -> tuple[str, dict[str, NDAr
         When the file is missing or damaged.
     """
     with outside_arrays(path, what, remedy) as archive:
-        arrays = {name: archive[name] for name in archive.files}
-        return str(arrays.pop(_DIGEST)), arrays
+        about = json.loads(str(archive[_ABOUT]))
+        return {**about, "digest": str(about["digest"])}, {
+            name: archive[name] for name in archive.files if name != _ABOUT
+        }
