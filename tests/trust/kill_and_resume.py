@@ -201,6 +201,10 @@ TRIALS = {
         ("design", "benchmark", "heliar", "--cpu-time", "0.2", "--seeds", "4", "--report", "out.html", "--json"), (),
         output=lambda text: [run["seed"] for run in json.loads(text)["runs"]],
     ),
+    "design benchmark --json": Trial(
+        ("design", "benchmark", "heliar", "--cpu-time", "0.2", "--seeds", "4", "--json"), ("state/partial/*",),
+        output=lambda text: [run["seed"] for run in json.loads(text)["runs"]],
+    ),
     "measure explain": Trial(
         ("measure", "explain", "model.json", "-o", "out", "--light", "9", *SEARCH),
         ("out/lens-*", "out/search.json", "out/explanation.txt"), prepare=_model,
@@ -260,9 +264,16 @@ TRIALS = {
         ("sources", "plate.####.png", "--csv", "out.csv", "--marked", "out.####.png"), ("out.csv", "out.*.png"),
         prepare=_plates,
     ),
+    "sources --json": Trial(
+        ("sources", "plate.####.png", "--json"), ("state/partial/*",), output=str, prepare=_plates,
+    ),
     "film": Trial(("film", "plate.####.png", "--force", "-o", "out.mp4"), ("out.mp4",), prepare=_plates),
     "dataset": Trial(
         ("dataset", "pairs.toml", "-n", "24", "--processes", "2", "-o", "out"), ("out/*",),
+        prepare=lambda folder: (folder / "pairs.toml").write_text(PAIRS) and None,
+    ),
+    "dataset --preview": Trial(
+        ("dataset", "pairs.toml", "-n", "12", "--preview", "out.png"), ("out*",),
         prepare=lambda folder: (folder / "pairs.toml").write_text(PAIRS) and None,
     ),
     "gallery": Trial(("gallery", "-o", "out", "--size", "32x18"), ("out/*.png", "out/index.html")),
