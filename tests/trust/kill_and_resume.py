@@ -32,7 +32,7 @@ KIND = "kill"
 # run a command with checkpoints every 50 ms, so that a tiny job has some
 CHILD = """
 import sys
-from flarewright.workflow import checkpoints
+from flarewright.workflow.kept_work import checkpoints
 checkpoints.CHECKPOINT_S = 0.05
 if sys.argv[1] == "render":
     from flarewright.render.image import partial_picture

@@ -6,6 +6,7 @@ Its arrays get no huge pages on Linux: a frame makes gigabytes of short-lived ar
 4 kB in the cache just before it is filled, but not one of 2 MB.
 
 - `app`: `main` and `run`: the command tree, errors and exit codes
+- `partial_work`: finished parts of a command beside its output or in the state folder
 - `common`: helpers of several commands: option values, output checks, remarks, JSON, progress bars
 - `progress_lines`: `ProgressLines`, progress as lines of JSON
 - `option_record`: `with_options`, commands whose options are the fields of a record

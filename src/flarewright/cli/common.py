@@ -14,8 +14,8 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import FlarewrightError, OutputError, ProjectError
-from ..workflow.checkpoints import kept_until_done
-from ..workflow.unnamed_work import unnamed_file
+from ..workflow.kept_work.checkpoints import kept_until_done
+from ..workflow.kept_work.unnamed_work import unnamed_file
 
 if TYPE_CHECKING:
     from rich.console import Console

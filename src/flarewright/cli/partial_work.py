@@ -31,7 +31,7 @@ def partial_work(output: Path | None, inputs: Sequence[Any], part: str, parts: s
     """
     from ..measure.core.checkpoint import Journal, journal
     from ..sentences import count
-    from ..workflow.unnamed_work import unnamed_file
+    from ..workflow.kept_work.unnamed_work import unnamed_file
 
     text = json.dumps(list(inputs))
     path = unnamed_file(text, ".json") if output is None else output.with_suffix(".partial.json")

@@ -262,8 +262,8 @@ def _kept(options: GhostsOptions, settled: ResolvedProject, *inputs: Any) -> Abs
     """Keep the finished ghosts in the state folder until the block is done; `inputs` determine them with the lens."""
     from ..._version import __version__
     from ...render.image.partial_picture import digest_of
-    from ...workflow.kept_analysis import kept_analysis
-    from ...workflow.unnamed_work import unnamed_file
+    from ...workflow.kept_work.kept_analysis import kept_analysis
+    from ...workflow.kept_work.unnamed_work import unnamed_file
 
     # how the ghosts are printed does not change them
     command = repr(replace(options, as_json=False, as_csv=False, brightest=None))

@@ -128,8 +128,8 @@ def _marked_pattern(text: str | None, settings: PlateSettings, frames: tuple[int
 
 def _kept(options: SourcesOptions) -> Path | None:
     """Return the file for partial work, beside the output or in the state folder; None if that cannot be written."""
+    from ...workflow.kept_work.unnamed_work import unnamed_file
     from ...workflow.plates.plate_sources import sources_file
-    from ...workflow.unnamed_work import unnamed_file
 
     output = options.table or options.marked
     if output is not None:

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..errors import FileError
-from ..io.render_state.kept_arrays import read_arrays, write_arrays
-from ..render.analysis_memory import AnalysisMemory
-from ..sentences import count
-from ..typing import Report
+from ...errors import FileError
+from ...io.render_state.kept_arrays import read_arrays, write_arrays
+from ...render.analysis_memory import AnalysisMemory
+from ...sentences import count
+from ...typing import Report
 from .checkpoints import kept_until_done
 
 _REMEDY = "its ghosts are traced again"

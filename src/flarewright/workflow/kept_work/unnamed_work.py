@@ -7,7 +7,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from ..io.files.state_folder import state_folder
+from ...io.files.state_folder import state_folder
 
 FORGOTTEN_S = 30.0 * 86400.0
 """Age at which partial work in the state folder is deleted."""

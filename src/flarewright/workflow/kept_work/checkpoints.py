@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Event, Thread
 
-from ..errors import OutputError
-from ..io.files.atomic_write import delete_written
+from ...errors import OutputError
+from ...io.files.atomic_write import delete_written
 
 CHECKPOINT_S = 10.0
 """Time between two checkpoints, unless writing takes more than a tenth of it."""
