@@ -27,6 +27,7 @@ from ..common import (
 )
 from ..option_record import with_options
 from ..shared_options import FNumber, Json, KnownLens, Zoom
+from .kept_glare import kept_glare
 
 if TYPE_CHECKING:
     from ...model import Lens, Project
@@ -158,9 +159,8 @@ def ghosts(options: GhostsOptions) -> None:
                 settled.lens, settled.order, settled.coating, query, progress=progress, memory=memory
             )
         if options.glare:
-            from ...render.scattering.veiling_glare import veiling_glare
-
-            veil = veiling_glare(project, options.wavelength_nm)
+            with one_bar("veiling glare") as progress:
+                veil = kept_glare(project, options.wavelength_nm, progress=progress)
     print_remarks(dict.fromkeys((*opened.remarks, *settled.remarks, *found)))
     if options.as_csv:
         print(table_csv(table, options.brightest), end="")

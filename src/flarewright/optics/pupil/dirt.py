@@ -17,6 +17,9 @@ from ...typing import Floats, Indices, Mask
 FIELD = 1.65
 """Radius of the dirt, in radii of the opening: beyond the corners of any iris."""
 
+DARK_DEPTH = 25.0
+"""Depth of dirt (`mean_depth`) that leaves no light: 1e-11 on average."""
+
 # fingerprint: ridge spacing, droplet diameter and spacing along ridges, half axes of the oval
 _RIDGE_MM, _DROPLET_MM, _DROPLET_STEP_MM, _PRINT_MM = 0.5, 0.06, 0.15, (7.0, 9.0)
 # half the bend angle of a scratch
@@ -29,8 +32,8 @@ _CLASSES = 6
 RAGGED = 0.1
 """Rms deviation of each edge of a scratch from its line, in widths; it damps the fringes with their order."""
 
-# correlation length of that deviation, in widths
-_RAGGED_STEP = 2.0
+# correlation length of that deviation, in widths; largest number of steps along a scratch
+_RAGGED_STEP, _MOST_KNOTS = 2.0, 100_000
 # order of a scratch's fringes beyond which none remain
 _LAST_ORDER = 6.0
 
@@ -119,6 +122,21 @@ def generate_dirt(dirt: Dirt, radius_mm: float, turn: float = 0.0) -> Elements:
         table[:, 0], table[:, 1] = c * table[:, 0] - s * table[:, 1], s * table[:, 0] + c * table[:, 1]
     bands[:, 2] += turn
     return Elements(found, bands)
+
+
+def mean_depth(dirt: Dirt) -> float:
+    """Return the mean area of dust and scratches per area of the stop: pieces at random pass exp(-depth) of the light.
+
+    Notes
+    -----
+    The coverage of a plane by pieces at random places, a Boolean model (Chiu, Stoyan, Kendall, Mecke: Stochastic
+    Geometry and its Applications, section 3.1). A log-uniform diameter from a to b has the mean square
+    (b^2 - a^2) / (2 log(b / a)).
+    """
+    low, high = (1e-3 * diameter for diameter in dirt.dust_um)
+    square = (high**2 - low**2) / (2.0 * math.log(high / low)) if high > low else low**2
+    dust = dirt.dust_per_mm2 * math.pi / 4.0 * square
+    return dust + 1e-2 * dirt.scratches_per_cm2 * dirt.scratch_mm * 1e-3 * dirt.scratch_um
 
 
 def _tiles(seed: int, kind: int, side: float, reach: float) -> list[tuple[np.random.Generator, Floats]]:
@@ -248,7 +266,7 @@ def _cover(amplitude: Floats, light: Floats, rows: slice, columns: slice, cover:
 
 def _ragged_edges(length: float, width: float, bend: float) -> Floats:
     """Return positions along a scratch and the random deviations of its two edges there, seeded by its bend; (3, K)."""
-    knots = np.arange(-0.6 * length, 0.6 * length, _RAGGED_STEP * width)
+    knots = np.arange(-0.6 * length, 0.6 * length, max(_RAGGED_STEP * width, 1.2 * length / _MOST_KNOTS))
     # linear interpolation between knots keeps two thirds of the variance
     heights = np.random.default_rng(int(1e12 * bend)).normal(0.0, RAGGED * width * math.sqrt(1.5), (2, len(knots)))
     return np.stack([knots, *heights])
