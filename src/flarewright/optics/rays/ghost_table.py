@@ -220,7 +220,7 @@ def ghost_table(
             if progress is not None:
                 progress(1.0 - left / len(todo), row.name)
     finally:
-        # an interruption drops the paths that have not begun
+        # an interruption drops the paths that are still waiting
         pool.shutdown(cancel_futures=True)
     rows = [known[path.name] for path in todo]
     direct = rows[0]
