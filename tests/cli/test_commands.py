@@ -382,6 +382,9 @@ def test_an_unexpected_end_of_a_file_is_no_interruption(monkeypatch):
         ("predict heliar-tronnier -o page.html --glare", True),
         ("predict heliar-tronnier", True),
         ("predict heliar-tronnier --cache=kept.npz --glare", True),
+        ("ghosts heliar-tronnier --light 1,1", True),
+        ("design benchmark heliar", True),
+        ("sources plate.png", True),
         ("render heliar-tronnier --light 1,1 -o a.exr", False),
     ],
 )
@@ -393,15 +396,6 @@ def test_ctrl_c_reports_commands_that_resume(capsys, monkeypatch, words, goes_on
     assert run(words.split()) == 130
     more = ", and the same command resumes" if goes_on else ""
     assert capsys.readouterr().err == f"flarewright: interrupted; nothing was left half-written{more}\n"
-
-
-def test_ctrl_c_reports_the_flag_that_a_command_lacked_to_resume(capsys, monkeypatch):
-    def stopped(**_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("flarewright.cli.app.command_tree", lambda words: stopped)
-    assert run(["design", "benchmark", "heliar"]) == 130
-    assert capsys.readouterr().err.endswith("; with --report or --picture the same command would resume\n")
 
 
 def test_a_real_draft_render(capsys, folder):

@@ -277,7 +277,7 @@ def test_an_ended_and_a_killed_search_resume_to_the_same_lenses(folder, plain, r
     assert run(["design", "resume", "cut", *SEARCH]) == 0
     assert made(folder / "cut") == whole
 
-    monkeypatch.setattr("flarewright.workflow.checkpoints.CHECKPOINT_S", 0.001)
+    monkeypatch.setattr("flarewright.workflow.kept_work.checkpoints.CHECKPOINT_S", 0.001)
     stored = threading.Event()
     write = report.write_state
 

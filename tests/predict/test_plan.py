@@ -403,7 +403,7 @@ def test_a_full_disk_loses_the_cache_and_not_the_prediction(tmp_path, monkeypatc
 
 def test_pictures_are_stored_while_the_work_goes_on(tmp_path, monkeypatch):
     """So that a killed run resumes; here the block itself waits for the file."""
-    monkeypatch.setattr("flarewright.workflow.checkpoints.CHECKPOINT_S", 0.01)
+    monkeypatch.setattr("flarewright.workflow.kept_work.checkpoints.CHECKPOINT_S", 0.01)
     stored = threading.Event()
     write = write_cache
 

@@ -32,7 +32,7 @@ KIND = "kill"
 # run a command with checkpoints every 50 ms, so that a tiny job has some
 CHILD = """
 import sys
-from flarewright.workflow import checkpoints
+from flarewright.workflow.kept_work import checkpoints
 checkpoints.CHECKPOINT_S = 0.05
 if sys.argv[1] == "render":
     from flarewright.render.image import partial_picture
@@ -201,6 +201,10 @@ TRIALS = {
         ("design", "benchmark", "heliar", "--cpu-time", "0.2", "--seeds", "4", "--report", "out.html", "--json"), (),
         output=lambda text: [run["seed"] for run in json.loads(text)["runs"]],
     ),
+    "design benchmark --json": Trial(
+        ("design", "benchmark", "heliar", "--cpu-time", "0.2", "--seeds", "4", "--json"), ("state/partial/*",),
+        output=lambda text: [run["seed"] for run in json.loads(text)["runs"]],
+    ),
     "measure explain": Trial(
         ("measure", "explain", "model.json", "-o", "out", "--light", "9", *SEARCH),
         ("out/lens-*", "out/search.json", "out/explanation.txt"), prepare=_model,
@@ -228,6 +232,14 @@ TRIALS = {
         ("predict", "heliar-tronnier", "--fstop", "16", "--quality", "draft", "--samples", "9", "--json"),
         ("state/partial/*",), output=str,
     ),
+    "ghosts": Trial(
+        ("ghosts", "heliar-tronnier", "--light", "8,5", "--orders", "4", "--order4-limit", "1e-4", "--csv"),
+        ("state/partial/*",), output=str,
+    ),
+    "ghosts --sweep": Trial(
+        ("ghosts", "heliar-tronnier", "--light", "8,5", "--sweep", "field=0:20:2", "--csv"),
+        ("state/partial/*",), output=str,
+    ),
     "render --quality final": Trial(
         ("render", "canon-28-80", "--light", "10,5", "--light", "-4,3", "--quality", "final", "--size", "480x270",
          "--orders", "4", "--no-png", "-o", "out.exr"),
@@ -252,9 +264,16 @@ TRIALS = {
         ("sources", "plate.####.png", "--csv", "out.csv", "--marked", "out.####.png"), ("out.csv", "out.*.png"),
         prepare=_plates,
     ),
+    "sources --json": Trial(
+        ("sources", "plate.####.png", "--json"), ("state/partial/*",), output=str, prepare=_plates,
+    ),
     "film": Trial(("film", "plate.####.png", "--force", "-o", "out.mp4"), ("out.mp4",), prepare=_plates),
     "dataset": Trial(
         ("dataset", "pairs.toml", "-n", "24", "--processes", "2", "-o", "out"), ("out/*",),
+        prepare=lambda folder: (folder / "pairs.toml").write_text(PAIRS) and None,
+    ),
+    "dataset --preview": Trial(
+        ("dataset", "pairs.toml", "-n", "12", "--preview", "out.png"), ("out*",),
         prepare=lambda folder: (folder / "pairs.toml").write_text(PAIRS) and None,
     ),
     "gallery": Trial(("gallery", "-o", "out", "--size", "32x18"), ("out/*.png", "out/index.html")),

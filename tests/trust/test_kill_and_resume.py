@@ -11,7 +11,7 @@ from .kill_and_resume import TRIALS, kill_and_resume
 
 # commands that end within a minute on any machine and any sensible input
 SHORT = {
-    "nuke-script", "ghosts", "cameras", "lenses", "edit", "lens show", "lens check", "lens convert", "lens schema",
+    "nuke-script", "cameras", "lenses", "edit", "lens show", "lens check", "lens convert", "lens schema",
     "looks save", "library list", "library search", "library show", "library remove",
     "coating list", "coating plot", "project init", "project check", "project schema", "scene init", "scene check",
     "scene schema", "design target", "design resize", "design move-stop", "design identify", "measure report",
@@ -34,22 +34,17 @@ def test_every_long_job_is_killed_by_the_rig_and_documented():
 
 
 @pytest.mark.parametrize(
-    ("line", "resumes"),
+    "line",
     [
-        ("measure run captures.csv -o run", True),
-        ("predict heliar-tronnier --output=a.html", True),
-        ("predict heliar-tronnier --cache a.npz", True),
-        ("predict heliar-tronnier", True),
-        ("design benchmark heliar --report a.html", True),
-        ("design benchmark heliar", False),
+        "measure run captures.csv -o run", "predict heliar-tronnier --output=a.html", "ghosts heliar-tronnier",
+        "design benchmark heliar",
     ],
-)
-def test_a_job_knows_whether_it_keeps_its_work(line, resumes):
-    words = line.split()
-    job = job_of(words)
+)  # fmt: skip
+def test_the_list_knows_a_job_by_its_words(line):
+    job = job_of(line.split())
+    assert job in JOBS
     assert job.resume == SAME
-    assert job.kept(words) is resumes
-    assert job_of(["ghosts", "heliar-tronnier"]) is None
+    assert job_of(["lenses", "heliar-tronnier"]) is None
 
 
 @pytest.mark.slow

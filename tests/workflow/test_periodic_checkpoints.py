@@ -3,11 +3,11 @@
 import threading
 
 from flarewright.errors import OutputError
-from flarewright.workflow.checkpoints import checkpoints
+from flarewright.workflow.kept_work.checkpoints import checkpoints
 
 
 def test_a_checkpoint_that_cannot_be_written_is_reported_once(monkeypatch):
-    monkeypatch.setattr("flarewright.workflow.checkpoints.CHECKPOINT_S", 0.0)
+    monkeypatch.setattr("flarewright.workflow.kept_work.checkpoints.CHECKPOINT_S", 0.0)
     tries, third = [], threading.Event()
 
     def full():

@@ -7,6 +7,7 @@ Its arrays get no huge pages on Linux: a frame makes gigabytes of short-lived ar
 
 - `app`: `main` and `run`: errors and exit codes
 - `command_tree`: `command_tree`, `COMMANDS`: which function runs each command
+- `partial_work`: finished parts of a command beside its output or in the state folder
 - `common`: helpers of several commands: option values, output checks, remarks, JSON, progress bars
 - `progress_lines`: `ProgressLines`, progress as lines of JSON
 - `option_record`: `with_options`, commands whose options are the fields of a record

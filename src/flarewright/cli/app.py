@@ -211,11 +211,7 @@ def _resuming(words: Sequence[str]) -> str:
     from ..workflow.long_jobs import SAME, job_of
 
     job = job_of(words)
-    if job is None or job.resume != SAME:
-        return ""
-    if job.kept(words):
-        return ", and the same command resumes"
-    return f"; with {job.needs[0]} or {job.needs[-1]} the same command would resume"
+    return "" if job is None or job.resume != SAME else ", and the same command resumes"
 
 
 def _lacks_memory(error: BaseException | None) -> bool:

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import signal
 import sys
-import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import FlarewrightError, OutputError, ProjectError
-from ..workflow.checkpoints import checkpoints
+from ..workflow.kept_work.checkpoints import kept_until_done
+from ..workflow.kept_work.unnamed_work import unnamed_file
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -277,8 +276,7 @@ def remembered(cache: Path | None, output: Path | None = None, unnamed: str = ""
     unnamed : str
         Identifies the command, so that the same one finds them there.
     """
-    kept = cache or (_unnamed_partial(unnamed) if output is None else output.with_suffix(".partial.npz"))
-    from ..io.files.atomic_write import delete_written
+    kept = cache or (unnamed_file(unnamed) if output is None else output.with_suffix(".partial.npz"))
     from ..io.render_state.flare_cache import read_cache, write_cache
 
     memory = read_cache(kept, print_remark) if kept.exists() else {}
@@ -294,38 +292,8 @@ def remembered(cache: Path | None, output: Path | None = None, unnamed: str = ""
             write_cache(kept, drawn)
             stored = number
 
-    failed = False
-    try:
-        with checkpoints(store, print_remark):
-            yield memory
-    except BaseException:
-        failed = True
-        raise
-    finally:
-        if cache is None and not failed:
-            delete_written(kept)
-        else:
-            try:
-                store()
-            except OutputError as error:
-                print_remarks([f"the pictures are not kept for a later run: {error}"])
-
-
-def _unnamed_partial(text: str) -> Path:
-    """Return the file with the partial work of a command without an output; those of forgotten commands are deleted."""
-    from ..io.files.state_folder import state_folder
-
-    folder = state_folder() / "partial"
-    with suppress(OSError):
-        folder.mkdir(parents=True, exist_ok=True)
-        for path in folder.glob("*.npz"):
-            if time.time() - path.stat().st_mtime > FORGOTTEN_S:
-                path.unlink()
-    return folder / f"{hashlib.sha256(f'{Path.cwd()} {text}'.encode()).hexdigest()[:32]}.npz"
-
-
-FORGOTTEN_S = 30.0 * 86400.0
-"""Age at which partial work in the state folder is deleted."""
+    with kept_until_done(kept, store, print_remark, "the pictures", lasting=cache is not None):
+        yield memory
 
 
 @contextmanager

@@ -15,6 +15,7 @@ import typer
 from ..errors import ProjectError
 from .common import check_place, first_run_bar, print_json, print_remark, print_remarks, progress_bar
 from .option_record import with_options
+from .partial_work import partial_work
 from .progress_lines import ProgressLines
 from .shared_options import output_option
 
@@ -151,9 +152,13 @@ def _preview(settings: DatasetSpec, preview: Path, spec: Path, options: DatasetO
     idle = _first_given({"--chunk": options.chunk, "--processes": options.processes, "--cluster": options.cluster})
     if idle is not None:
         raise ProjectError(f"{idle} has no effect on a contact sheet; leave it out")
+    from ..io.images.contact_sheet import Figure
     from ..io.images.png import write_png
+    from ..measure.core.checkpoint import recorded
+    from ..workflow.training_pairs.background import list_backgrounds
     from ..workflow.training_pairs.draw import draw_item
     from ..workflow.training_pairs.preview import preview_picture
+    from ..workflow.training_pairs.run import dataset_digest
 
     number = _PREVIEWED if options.items is None else options.items
     if number > _MOST_PREVIEWED:
@@ -162,11 +167,15 @@ def _preview(settings: DatasetSpec, preview: Path, spec: Path, options: DatasetO
     from ..kernels.jit.warmup_processes import cores
 
     _compile(draw_item(settings, 0).project, options.threads or cores())
-    with progress_bar() as begin:
+    recorded(Figure)
+    # a larger -n draws the same first items
+    inputs = ["preview", dataset_digest(settings, list_backgrounds(settings))]
+    with partial_work(preview, inputs, "item", "items") as steps, progress_bar() as begin:
         bar = begin("preview")
         sheet = preview_picture(
-            settings, number, threads=options.threads, report=lambda done, of: bar(done / of, f"item {done} of {of}")
-        )
+            settings, number, threads=options.threads, step=steps.step,
+            report=lambda done, of: bar(done / of, f"item {done} of {of}"),
+        )  # fmt: skip
     write_png(preview, sheet, {"Description": f"first {number} items of {spec.name}"})
     if options.as_json:
         print_json({"preview": str(preview), "items": number})

@@ -8,6 +8,8 @@ Modules and sub-packages:
 - `remarks`: sentences for the user about a finished picture
 - `summary`: `summary_of`: facts of a picture as JSON data
 - `analysis`: `paraxial` and `ghosts`, the analyses that accept any form of lens
+- `analysis_memory`: `AnalysisMemory`: the finished part of an interrupted analysis
+- `progress_parts`: `progress_parts`: the progress of several parts as that of one piece of work
 - `gallery`: `cards`, `card_project`, `card_picture`: pictures of the shipped lenses and looks
 - `warmup`: `compile_for_render`, `compile_for_analysis`: compile kernels ahead of time
 - `ghosts`: the ghost pass, draft and final quality

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from .._version import __version__
 from ..errors import ProjectError
 from ..io.lens.coating_text import coating_choice
 from ..model import Coating, CoatingChoice, Imperfection, Lens, Plate
@@ -14,10 +15,13 @@ from ..optics.rays.bundle import least_distance
 from ..optics.rays.ghost_table import GhostQuery, GhostTable, ghost_table, pack_for_query
 from ..optics.rays.pack import SensorMirror
 from ..typing import Progress
+from .analysis_memory import AnalysisMemory, AnalysisPart
+from .image.partial_picture import digest_of
+from .progress_parts import progress_parts
 from .scene.resolve import build, check_opens, open_lens
 
-# part of the work that searches the paths of four reflections
-_SEARCH_PART = 0.1
+# time of the search for paths of four reflections, and of the ghosts
+_WEIGHTS = {"search": 1.0, "ghosts": 9.0}
 
 
 def paraxial(
@@ -130,6 +134,7 @@ def find_ghosts(
     *,
     threads: int | None = None,
     progress: Progress | None = None,
+    memory: AnalysisMemory | None = None,
 ) -> tuple[GhostTable, tuple[str, ...]]:
     """Analyse every ghost of a lens that is built, including those of four reflections on request.
 
@@ -144,6 +149,8 @@ def find_ghosts(
     threads : int, optional
     progress : callable, optional
         Called with the finished fraction (0 to 1) and a description.
+    memory : AnalysisMemory, optional
+        Finished parts of analyses, of an interrupted command too; those of this one are added.
 
     Returns
     -------
@@ -166,26 +173,24 @@ def find_ghosts(
             f"a light at {query.distance:g} mm stands in the lens {lens.name} or behind its entrance pupil; "
             f"give more than {least_distance(packed):.4g} mm"
         )
+    part = AnalysisPart() if memory is None else memory.part(digest_of(__version__, lens, packed, query))
     if query.orders == 2:
-        return ghost_table(lens, packed, query, threads=threads, progress=progress), ()
+        return ghost_table(lens, packed, query, threads=threads, progress=progress, measured=part.rows), ()
     from .reference.four_reflections import find_four_reflections_unbounded
 
-    search, rest = _between(progress, 0.0, _SEARCH_PART), _between(progress, _SEARCH_PART, 1.0)
-    found = find_four_reflections_unbounded(lens, packed, query, threads=threads, progress=search)
-    table = ghost_table(lens, packed, query, others=found.paths, threads=threads, progress=rest)
+    parts = progress_parts(progress, _WEIGHTS)
+    found = find_four_reflections_unbounded(
+        lens, packed, query, threads=threads, progress=parts["search"], sums=part.sums
+    )
+    table = ghost_table(
+        lens, packed, query, others=found.paths, threads=threads, progress=parts["ghosts"], measured=part.rows
+    )
     # remove the rows below the limit
     two = sum(row.throughput_mm2 for row in table.ghosts if not row.later_reflections)
     rows = [row for row in table.ghosts if not row.later_reflections or row.throughput_mm2 > query.order4_limit * two]
-    dark, part = found.left_out({row.name for row in rows})
+    dark, share = found.left_out({row.name for row in rows})
     remark = (
         f"ghosts of four reflections carry {found.share:.2%} of what those of two do; {dark} fainter ones with "
-        f"{part:.1%} of that are not listed"
+        f"{share:.1%} of that are not listed"
     )
     return replace(table, ghosts=tuple(rows)), (remark,)
-
-
-def _between(progress: Progress | None, start: float, end: float) -> Progress | None:
-    """Return the callback of a part of the work."""
-    if progress is None:
-        return None
-    return lambda part, words: progress(start + (end - start) * part, words)

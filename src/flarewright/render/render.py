@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -25,6 +25,7 @@ from .image.compose import beauty
 from .image.gamut import apply_gamut
 from .image.ghost_ranking import RANK_BYTES, GhostRanking, ghost_matte, rank_remarks
 from .image.shown_layer import ShownLayer, shown_layers
+from .progress_parts import progress_parts
 from .remarks import black_remarks, ghost_veil_remarks, mask_remarks, percent, scene_remarks
 from .scattering.scatter_pass import render_scatter, scatter_facts, scatter_of, without_scattered
 from .scene.arguments import Settings, naming_settings, project_of
@@ -50,6 +51,8 @@ PARALLEL_PX = 1_000_000
 """A larger picture's starburst is not computed in parallel with its ghosts: both at once need 100 MB more at 1080p."""
 PIXEL_BYTES = 12
 """Memory of a layer per pixel: three float32."""
+# passes in their order, with typical times
+_TIMES = {"ghosts": 10.0, "search": 2.0, "fours": 10.0, "scatter": 4.0, "starburst": 1.0}
 
 
 @dataclass(frozen=True)
@@ -158,22 +161,23 @@ def render(
     images = [direct_image(settled.lens, shot) for shot in shots]
     stars = images if tables is None else without_scattered(images, tables)
     starburst: Callable[[], Layer] = partial(starburst_of, settled, shots, stars, mask, soil, threads=threads)
+    parts = _parts(project, tables is not None, progress)
     if project.quality.mode == "reference":
-        drawn = _reference(settled, mask, run, threads, progress)
+        drawn = _reference(settled, mask, run, threads, parts["ghosts"])
     else:
         if project.output.starburst and prod(project.camera.size_px) <= PARALLEL_PX:
             starburst = _start_early(starburst, threads)
-        drawn = _ghosts(settled, seen, art, _Work(threads, progress, costs, kept, ranking))
+        drawn = _ghosts(settled, seen, art, _Work(threads, parts, costs, kept, ranking))
     passes = list(drawn.passes)
     scattered: dict[str, Any] = {}
     scatter_remarks: tuple[str, ...] = ()
     if tables is not None:
         if project.quality.mode != "reference":
-            passes.append(render_scatter(settled, shots, images, tables, threads=threads))
+            passes.append(render_scatter(settled, shots, images, tables, threads=threads, progress=parts["scatter"]))
         facts, scatter_remarks = scatter_facts(settled, tables)
         scattered = {"scatter": facts}
     if project.output.starburst:
-        passes.insert(0, starburst())
+        passes.insert(0, _reported(starburst, "starburst", parts["starburst"]))
     # overflow raises an error below
     with np.errstate(over="ignore", invalid="ignore"):
         passes = [with_gain(layer, art.gain.get(layer.name.removesuffix(".order4"), 1.0)) for layer in passes]
@@ -210,6 +214,29 @@ def render(
         None if costs is None else RenderProfile(costs.search_s, costs.costs()),
         matte,
     )
+
+
+def _parts(project: Project, scatters: bool, progress: Progress | None) -> dict[str, Progress | None]:
+    """Return the progress of each pass of a render."""
+    final, fours = project.quality.mode == "final", project.quality.orders == 4
+    drawn = {
+        "ghosts": True,
+        "search": final and fours,
+        "fours": final and fours,
+        "scatter": scatters and project.quality.mode != "reference",
+        "starburst": project.output.starburst,
+    }
+    return progress_parts(progress, {name: time if drawn[name] else 0.0 for name, time in _TIMES.items()})
+
+
+def _reported(work: Callable[[], Layer], name: str, progress: Progress | None) -> Layer:
+    """Do work of one step, and report its start and its end."""
+    if progress is not None:
+        progress(0.0, name)
+    layer = work()
+    if progress is not None:
+        progress(1.0, name)
+    return layer
 
 
 def _through_iris(
@@ -298,7 +325,7 @@ class _Work:
     """How ghosts are drawn, without effect on their light: threads, and what is reported, timed, kept and ranked."""
 
     threads: int | None
-    progress: Progress | None
+    parts: Mapping[str, Progress | None]
     costs: CostMeter | None
     kept: PartialPicture | None
     ranking: GhostRanking | None
@@ -314,8 +341,8 @@ def _ghosts(
     paths = ghost_paths(settled.lens, project.quality.paths, sensor=settled.sensor is not None)
     singles = project.output.brightest if project.output.layers == "ghosts" else 0
     ghosts = render_ghosts(
-        shots, paths, project.quality, singles=singles, art=art.paths, threads=work.threads, progress=work.progress,
-        costs=work.costs, kept=work.kept, ranking=work.ranking,
+        shots, paths, project.quality, singles=singles, art=art.paths, threads=work.threads,
+        progress=work.parts["ghosts"], costs=work.costs, kept=work.kept, ranking=work.ranking,
     )  # fmt: skip
     facts = {
         "drawn": ghosts.drawn,
@@ -354,16 +381,19 @@ def _fours(
     work: _Work,
 ) -> _Drawn:
     """Draw the four-reflection ghosts above the limit; `levels` of two-reflection ghosts without and with art."""
-    from .reference.four_reflections import find_four_reflections
+    from .reference.kept_search import search_kept
 
     quality = settled.project.quality
     limit = quality.order4_limit
-    found = find_four_reflections(settled.lens, shots, limit, quality.seed, which=quality.paths, threads=work.threads)
+    found = search_kept(
+        work.kept, settled.lens, shots, limit, quality.seed, which=quality.paths, threads=work.threads,
+        progress=work.parts["search"],
+    )  # fmt: skip
     art = resolve_art(settled, found.paths)
     ghosts = render_ghosts(
         shots, found.paths, quality.replace(cull=0.0), singles=singles, art=art.paths, level=levels[1],
-        faintest=limit * levels[0], threads=work.threads, progress=work.progress, costs=work.costs, kept=work.kept,
-        ranking=work.ranking,
+        faintest=limit * levels[0], threads=work.threads, progress=work.parts["fours"], costs=work.costs,
+        kept=work.kept, ranking=work.ranking,
     )  # fmt: skip
     muted = {name for name, changed in art.paths.items() if not changed.enabled}
     dark, part = found.left_out(muted.union(ghosts.names))

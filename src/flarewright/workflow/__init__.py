@@ -29,7 +29,7 @@ The command line and other front ends call these functions; nothing here prints.
 - `frame_files`: `with_frame_files`, the files of one frame of sequences that hide lights
 - `motion_blur`: `subframe_count` and `mean_layers`, the mean over the open shutter
 - `training_pairs`: `dataset` draws training pairs for flare removal and detection
-- `checkpoints`: `checkpoints` stores the state of a long job every few seconds
+- `kept_work`: checkpoints of long jobs, and where commands without an output keep their partial work
 - `long_jobs`: `JOBS` lists the commands that can run for more than a minute, and how each keeps its partial work
 - `defaults`: default sizes of predictions
 """

@@ -10,7 +10,9 @@ from math import hypot
 from ..model import Project
 from ..optics.rays.ghost_table import GhostQuery, GhostTable
 from ..render.analysis import find_ghosts
+from ..render.analysis_memory import AnalysisMemory
 from ..render.scene.resolve import resolve_project
+from ..typing import Progress
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,9 @@ def sweep_ghosts(
     fields_deg: Sequence[tuple[float, float]],
     wavelengths_nm: Sequence[float],
     f_numbers: Sequence[float | None],
+    *,
+    memory: AnalysisMemory | None = None,
+    progress: Progress | None = None,
 ) -> Iterator[SweepPoint]:
     """Analyse the ghosts of every combination.
 
@@ -88,6 +93,8 @@ def sweep_ghosts(
     wavelengths_nm : sequence of float
     f_numbers : sequence of float or None
         None: wide open.
+    memory, progress
+        As of `render.analysis.find_ghosts`.
 
     Yields
     ------
@@ -99,12 +106,24 @@ def sweep_ghosts(
     FlarewrightError
         As in `render.analysis.ghosts`.
     """
+    number, done = len(f_numbers) * len(fields_deg) * len(wavelengths_nm), 0
     for f_number, points in groupby(product(f_numbers, fields_deg, wavelengths_nm), key=lambda point: point[0]):
         settled = resolve_project(project.replace(f_number=f_number))
         for _, field_deg, wavelength_nm in points:
             asked = replace(query, field_deg=field_deg, wavelength_nm=wavelength_nm)
-            table, _ = find_ghosts(settled.lens, settled.order, settled.coating, asked)
+            table, _ = find_ghosts(
+                settled.lens, settled.order, settled.coating, asked, memory=memory,
+                progress=_of_point(progress, done, number),
+            )  # fmt: skip
+            done += 1
             yield SweepPoint(field_deg, wavelength_nm, table.f_number, table)
+
+
+def _of_point(progress: Progress | None, done: int, number: int) -> Progress | None:
+    """Return the callback of one point of a sweep."""
+    if progress is None:
+        return None
+    return lambda part, words: progress((done + part) / number, f"{done + 1} of {number}, {words}")
 
 
 def surface_gains(points: Sequence[SweepPoint]) -> tuple[SurfaceGain, ...]:

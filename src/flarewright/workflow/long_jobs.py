@@ -23,19 +23,11 @@ class LongJob:
         File with the partial work, in the words of the help.
     resume : str
         Command that resumes.
-    needs : tuple of str
-        Options of which one has to be given, else there is no file to keep the work in; empty: always kept.
     """
 
     words: tuple[str, ...]
     keeps: str
     resume: str = SAME
-    needs: tuple[str, ...] = ()
-
-    def kept(self, words: Sequence[str]) -> bool:
-        """Return whether the command with these words keeps its partial work."""
-        flags = {word.split("=")[0] for word in words}
-        return not self.needs or bool(flags & set(self.needs))
 
 
 JOBS = (
@@ -43,7 +35,7 @@ JOBS = (
     LongJob(("design", "resume"), "DIR/search.json", "flarewright design resume DIR"),
     LongJob(("design", "scratch"), "DIR/search.json", "flarewright design resume DIR"),
     LongJob(("design", "colors"), "LENS.partial.json"),
-    LongJob(("design", "benchmark"), "NAME.partial.json", needs=("--report", "--picture")),
+    LongJob(("design", "benchmark"), "NAME.partial.json"),
     LongJob(("measure", "run"), "DIR/frames, DIR/STAGE.journal"),
     LongJob(("measure", "merge"), "DIR/frames"),
     LongJob(("measure", "find"), "DIR/find.journal"),
@@ -51,12 +43,13 @@ JOBS = (
     LongJob(("measure", "track"), "DIR/track.journal"),
     LongJob(("measure", "compress"), "DIR/compress.journal"),
     LongJob(("measure", "explain"), "DIR/search.json"),
+    LongJob(("ghosts",), "the state folder's `partial`"),
     LongJob(("predict",), "NAME.partial.npz"),
     LongJob(("render",), "NAME.partial, NAME.state.npz", "the same command, or --resume NAME.state.npz"),
     LongJob(("shot",), "the finished frames"),
     LongJob(("film",), "FILM.parts"),
-    LongJob(("dataset",), "the finished items", needs=("-o", "--output")),
-    LongJob(("sources",), "NAME.lights.npz", needs=("--csv", "--marked")),
+    LongJob(("dataset",), "the finished items"),
+    LongJob(("sources",), "NAME.lights.npz"),
     LongJob(("gallery",), "DIR/gallery.json"),
     LongJob(("library", "add"), "the library"),
     LongJob(("library", "thumbnails"), "the library"),

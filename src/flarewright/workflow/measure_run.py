@@ -235,7 +235,7 @@ def _kept(job: _Job, name: str, made: Path) -> tuple[bool, bool]:
     digest = run_digest(folder, job.run, stage.given(job))
     if is_current(folder, name, digest, made):
         return True, _as_wanted(job, name, digest, made.name)
-    with journal(folder / f"{name}.journal", digest) as steps:
+    with journal(folder / f"{name}.journal", digest, job.report) as steps:
         if steps.remembered:
             job.report(f"{name} resumes after {count(steps.remembered, 'step')} of an earlier run")
         stage.make(job, steps)
@@ -322,7 +322,7 @@ def _as_wanted(job: _Job, name: str, digest: str, made: str) -> bool:
     if model.sprites and not job.residual:
         job.files.write(made, model.replace(sprites=()))
     elif job.whole and not model.sprites:
-        with journal(left, digest) as steps:
+        with journal(left, digest, job.report) as steps:
             views = read_views(job.folder, job.run, job.every)
             job.files.write(made, learn.with_residual(model, views, job.threads, steps))
     else:

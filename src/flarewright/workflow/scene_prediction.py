@@ -93,6 +93,7 @@ def predict_scene(
     shortest_shot_s: float = 0.0,
     pictures: bool = False,
     glare: bool = False,
+    glare_of: Callable[..., VeilingGlare] = veiling_glare,
     memory: Memory | None = None,
     threads: int | None = None,
     processes: int | None = None,
@@ -119,6 +120,8 @@ def predict_scene(
         Render the worst times, for the report.
     glare : bool
         Compute the veiling glare index of each camera.
+    glare_of : callable
+        Computes it, with the parameters of `veiling_glare`.
     memory : dict, optional
         Pictures drawn before; new ones are added.
     threads : int, optional
@@ -152,7 +155,8 @@ def predict_scene(
             worst = render_worst(plan, ranked, partial(maker, shown=True), progress("pictures"), memory, spread)
     veils = np.stack([plan.veil(camera) for camera in range(len(plan.tracks))])
     shots = choose_cameras(veils, plan.times_s, shortest_shot_s)
-    veiling = (_glare(scene, camera, threads) if glare else None for camera in scene.cameras)
+    work = partial(glare_of, threads=threads)
+    veiling = (_glare(scene, camera, work, progress) if glare else None for camera in scene.cameras)
     return ScenePrediction(plan, tuple(ranked), tuple(shots), found, tuple(worst), tuple(veiling))
 
 
@@ -184,7 +188,10 @@ def _prepare(scene: Scene, threads: int | None, prepare: Callable[[Project, int 
         raise ProjectError(f"camera {camera.name}: {error}") from None
 
 
-def _glare(scene: Scene, camera: SceneCamera, threads: int | None) -> VeilingGlare | None:
+def _glare(
+    scene: Scene, camera: SceneCamera, work: Callable[..., VeilingGlare], progress: Callable[[str], Progress]
+) -> VeilingGlare | None:
     if camera.lens is None:
         return None
-    return veiling_glare(camera_project(camera, scene.lights[0], 0.0), D_LINE_NM, threads=threads)
+    shown = progress(f"veiling glare of {camera.name}")
+    return work(camera_project(camera, scene.lights[0], 0.0), D_LINE_NM, progress=shown)

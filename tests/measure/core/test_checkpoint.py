@@ -62,6 +62,25 @@ def test_a_journal_restores_every_bit(tmp_path):
     assert not (tmp_path / "j").exists()
 
 
+@pytest.mark.parametrize(
+    ("harm", "sentence"),
+    [
+        (lambda lines: [], "is damaged; its steps are repeated"),
+        (lambda lines: ["x", *lines[1:]], "is damaged; its steps are repeated"),
+        (lambda lines: [*lines[:2], "x"], "is damaged after 1 step; later ones are repeated"),
+        (lambda lines: lines, None),
+    ],
+)
+def test_a_damaged_journal_is_named_in_one_sentence(harm, sentence, tmp_path):
+    interrupted(tmp_path / "j", "a", [1.0, 2.0])
+    lines = (tmp_path / "j").read_text().splitlines(keepends=True)
+    (tmp_path / "j").write_text("".join(harm(lines)))
+    said = []
+    with journal(tmp_path / "j", "a", said.append):
+        pass
+    assert said == ([] if sentence is None else [f"{tmp_path / 'j'} {sentence}"])
+
+
 def test_a_journal_with_another_digest_or_a_damaged_line_is_discarded(tmp_path):
     assert interrupted(tmp_path / "j", "a", [1.0, 2.0]) == 0
     assert interrupted(tmp_path / "j", "a", [1.0, 2.0, 3.0]) == 2

@@ -11,6 +11,7 @@ from flarewright.model import Art, Camera, Iris, Light, Output, Project, Quality
 from flarewright.render.image import partial_picture
 from flarewright.render.image.canvas import blank
 from flarewright.render.image.partial_picture import KeptSteps, PartialPicture, digest_of
+from flarewright.render.reference import four_reflections
 from flarewright.render.render import render
 
 POINTS = (Light(field_deg=(9.0, 4.0)), Light(field_deg=(-5.0, 2.0)))
@@ -106,6 +107,37 @@ def test_an_interrupted_render_resumes_to_the_same_pixels(case, tmp_path):
     assert same(found, render(CASES[case]).layers)
     assert said == [f"{folder}: resuming an interrupted run"]
     assert not folder.exists()
+
+
+def test_an_interrupted_search_for_four_reflections_resumes(tmp_path, monkeypatch):
+    class InSearch(PartialPicture):
+        """A partial picture whose render is interrupted after two batches beyond the pilot."""
+
+        written = 0
+
+        def store_arrays(self, *given):
+            self.written += super().store_arrays(*given)
+            if self.written == 2:
+                raise KeyboardInterrupt
+            return True
+
+    batches, trace = [], four_reflections.run_batch
+
+    def counted(sources, k, **more):
+        batches.append(k)
+        return trace(sources, k, **more)
+
+    monkeypatch.setattr(four_reflections, "run_batch", counted)
+    folder = tmp_path / "out.partial"
+    with pytest.raises(KeyboardInterrupt):
+        render(FOURS, kept=InSearch(folder, print), threads=2)
+    batches.clear()
+    found, said = resumed(FOURS, folder)
+    # those of the interrupted run are not traced again
+    assert min(batches) == four_reflections.PILOT + 2
+    assert said == [f"{folder}: resuming an interrupted run"]
+    monkeypatch.undo()
+    assert same(found, render(FOURS).layers)
 
 
 def test_a_resumed_render_draws_only_the_other_ghosts(tmp_path, monkeypatch):

@@ -10,12 +10,12 @@ import pytest
 from pupil_sum import mono, picture, scene
 
 from flarewright.errors import ProjectError
-from flarewright.kernels.montecarlo.forward import IN_PICTURE
 from flarewright.kernels.tracing.sequential import REFLECT
 from flarewright.model import Art, Camera, Rule
 from flarewright.optics.lens.paths import four_path
 from flarewright.render.reference import four_reflections
 from flarewright.render.reference.four_reflections import find_four_reflections
+from flarewright.render.reference.search_sums import HITS, Tally
 from flarewright.render.render import render
 from flarewright.render.scene.opening import make_opening
 from flarewright.render.scene.resolve import load_lens, resolve_project
@@ -98,10 +98,10 @@ def test_a_limit_too_low_says_so(monkeypatch):
 
 @pytest.mark.filterwarnings("error")
 def test_a_limit_whose_quotient_overflows_takes_the_most_batches():
-    tally = four_reflections._Tally()
-    tally.add({"fours": np.array([[7.0, 0.5], [7.0, 0.5]]), "figures": np.full(IN_PICTURE + 2, 10.0)})
+    tally = Tally()
+    tally.add(np.array([[7.0, 0.5], [7.0, 0.5]]), 10.0)
     assert [tally.batches_for(limit) for limit in (1e-320, 5e-324)] == [10**9] * 2
-    assert tally.batches_for(0.01) == ceil(four_reflections.HITS * 0.5 / 0.1)
+    assert tally.batches_for(0.01) == ceil(HITS * 0.5 / 0.1)
 
 
 def test_same_side_paths_stay_on_one_side():

@@ -11,7 +11,7 @@ from scipy.integrate import trapezoid
 
 from flarewright.model import Art, Camera, Dirt, Iris, Light, Output, Project, Quality, Rule, Starburst
 from flarewright.optics.diffraction.fraunhofer import Pattern, Soil, pupil_pattern
-from flarewright.optics.pupil.dirt import FIELD, RAGGED, Elements, generate_dirt, rasterise, scattered
+from flarewright.optics.pupil.dirt import FIELD, RAGGED, Elements, generate_dirt, mean_depth, rasterise, scattered
 from flarewright.optics.pupil.polygon import closed
 from flarewright.optics.pupil.pupil_function import FFT_SIZE, WINDOW, pupil_amplitude
 from flarewright.render.ghosts.extent_blur import blur_by_extent, shape_kernel
@@ -114,6 +114,60 @@ def test_parseval_in_the_fourier_core():
     centre = np.diff(np.diff(pattern.table[K : K + 2, K : K + 2], axis=0), axis=1)[0, 0] * pattern.knots_per_s**2
     expected = (pupil.amplitude.sum() * (WINDOW / FFT_SIZE) ** 2) ** 2 / pupil.light
     assert centre == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "dirt",
+    [
+        Dirt(dust_per_mm2=20.0, dust_um=(90.0, 400.0), seed=1),
+        Dirt(dust_per_mm2=20.0, dust_um=(200.0, 200.0), seed=2),
+        Dirt(scratches_per_cm2=100.0, scratch_um=120.0, scratch_mm=6.0, seed=3),
+    ],
+    ids=["dust", "equal dust", "scratches"],
+)
+def test_random_pieces_pass_the_exponential_of_their_depth(dirt):
+    """A Boolean model, against the drawn picture; the tolerance is the spread of a picture of few pieces."""
+    spacing = WINDOW / FFT_SIZE
+    at = (np.arange(-170, 170) + 0.5) * spacing * 2.0
+    _, light = rasterise(generate_dirt(dirt, 8.0), at)
+    assert mean_depth(dirt) > 0.5
+    assert -math.log(light.mean()) == pytest.approx(mean_depth(dirt), rel=0.1)
+
+
+def test_dirt_without_a_gap_is_refused_before_it_is_drawn(monkeypatch):
+    monkeypatch.setattr("flarewright.optics.diffraction.fraunhofer.generate_dirt", None)
+    dark = Dirt(dust_per_mm2=200.0, dust_um=(400.0, 500.0))
+    with pytest.raises(ValueError, match="the dirt blocks all light"):
+        pupil_pattern(Iris(), radius_mm=20.0, soil=Soil(dark))
+
+
+@pytest.mark.parametrize("width_um", [1e-6, 1e-3, 1.0])
+def test_a_scratch_of_any_small_width_keeps_its_area(width_um):
+    """Softening a band narrower than a sample adds 4 % to its area, whatever its width."""
+    spacing, width = WINDOW / FFT_SIZE, 1e-3 * width_um / 8.0
+    arc = np.array([[0.02, 0.01, 0.3, 0.2, width, 0.05]])
+    _, light = rasterise(Elements(np.empty((0, 4)), arc), (np.arange(-60, 60) + 0.5) * spacing)
+    assert (1.0 - light).sum() * spacing**2 == pytest.approx(0.2 * width, rel=0.05)
+
+
+@pytest.mark.parametrize("normal", [0.0, 0.5, 0.79, 1.6, 2.4, 3.2, 4.0, 5.5])
+@pytest.mark.parametrize("width", [0.002, 0.04])
+def test_a_scratch_is_drawn_in_its_whole_window(normal, width, monkeypatch):
+    """The samples near the arc are all that it covers: drawing every sample of its window gives the same bytes."""
+    from flarewright.optics.pupil import dirt
+
+    at = (np.arange(-150, 150) + 0.5) * 0.01
+    arc = np.array([[0.1, -0.2, normal, 1.0, width, 0.08]])
+    few = rasterise(Elements(np.empty((0, 4)), arc), at)
+
+    def every(_at, rows, columns, *_):
+        row, column = np.meshgrid(np.arange(rows.start, rows.stop), np.arange(columns.start, columns.stop))
+        return row.ravel(), column.ravel()
+
+    monkeypatch.setattr(dirt, "_near_arc", every)
+    whole = rasterise(Elements(np.empty((0, 4)), arc), at)
+    assert few[1].min() < 1.0
+    np.testing.assert_array_equal(few, whole)
 
 
 def test_dirt_stays_where_it_is_when_the_iris_closes():

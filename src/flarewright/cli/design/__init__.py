@@ -7,7 +7,6 @@
 - `edit`: `design resize` and `design move-stop`
 - `identify`: `design identify`, what ghosts determine of a lens
 - `benchmark`: `design benchmark`, the tests of the thesis
-- `partial_work`: finished parts of a search beside its output
 - `options`: options that several commands of searches share
 - `checks`: checks of options that several design commands share
 """

@@ -14,9 +14,9 @@ import typer
 from ...errors import ProjectError
 from ..common import check_place, console, print_json, print_remark, status_line, stop_on_interrupt, write_text
 from ..option_record import with_options
+from ..partial_work import partial_work
 from ..shared_options import Json
 from .checks import check_color_fitness, check_films, check_fitness, check_time
-from .partial_work import partial_work
 
 if TYPE_CHECKING:
     from ...design.solvers.evolution_log import Limits
@@ -93,7 +93,7 @@ class BenchmarkOptions:
 def benchmark(options: BenchmarkOptions) -> None:
     """Search lenses or coatings with the ghosts of a known lens, and compare the pictures.
 
-    Finished runs are kept beside the report or picture: after an interruption, the same command continues.
+    Finished runs are kept until the end: after an interruption, the same command continues.
     """
     trial = _trial(options)
     limits = _limits(options.time_s, options.cpu_s)
@@ -178,9 +178,8 @@ def _run_all(trial: Trial, options: BenchmarkOptions, limits: Limits, measure: A
             done.append(steps.step(partial(run_one, seed=seed, limits=shown, choice=choice), asked))
         cut_off = steps.unfinished = asked()
     if cut_off:
-        again = "; to resume: the same command" if place else ""
         of = options.seeds * len(choices)
-        print_remark(f"ended after {len(done)} of {of} runs, the last one cut off{again}")
+        print_remark(f"ended after {len(done)} of {of} runs, the last one cut off; to resume: the same command")
     return done
 
 

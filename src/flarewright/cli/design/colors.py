@@ -11,10 +11,10 @@ import typer
 from ...errors import ProjectError
 from ..common import check_place, console, one_of, print_json, print_remarks, stop_on_interrupt
 from ..option_record import with_options
+from ..partial_work import partial_work
 from ..shared_options import Json, Threads, output_option
 from .checks import check_color_fitness, check_films, check_time
 from .options import Seed
-from .partial_work import partial_work
 
 if TYPE_CHECKING:
     from ...design.coatings.color_genes import ColorMeasure

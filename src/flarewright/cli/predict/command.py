@@ -13,6 +13,7 @@ from ...workflow.defaults import SHOWN_PX
 from ..common import (
     check_place,
     console,
+    one_bar,
     pair,
     print_json,
     print_remark,
@@ -22,6 +23,7 @@ from ..common import (
     write_text,
 )
 from ..option_record import with_options
+from ..render.kept_glare import kept_glare
 from .options.record import PredictOptions
 from .scene import is_scene_file, predict_and_print
 
@@ -242,9 +244,9 @@ def _project(options: PredictOptions, sensor: tuple[float, float]) -> Project:
 
 def _glare(project: Project, threads: int | None) -> VeilingGlare:
     from ...optics.lens.dispersion import D_LINE_NM
-    from ...render.scattering.veiling_glare import veiling_glare
 
-    return veiling_glare(project, D_LINE_NM, threads=threads)
+    with one_bar("veiling glare") as progress:
+        return kept_glare(project, D_LINE_NM, threads=threads, progress=progress)
 
 
 def _print(found: Occurrence) -> None:

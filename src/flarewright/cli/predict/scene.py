@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import ProjectError
 from ..common import console, print_json, print_remark, print_remarks, progress_bar, remembered, write_text
+from ..render.kept_glare import kept_glare
 
 if TYPE_CHECKING:
     from ...model.project.scene import Scene
@@ -53,6 +54,7 @@ def predict_and_print(path: Path, options: PredictOptions, unnamed: str) -> None
             found = predict_scene(
                 scene, file=path, quality=options.quality or "final", near=near,
                 shortest_shot_s=options.shortest_shot or 0.0, pictures=options.output is not None, glare=options.glare,
+                glare_of=kept_glare,
                 memory=memory, threads=options.threads, processes=options.processes, cluster=options.cluster,
                 folder=folder, prepare=compile_for_render, progress=progress, announce=print_remark,
             )  # fmt: skip

@@ -16,5 +16,6 @@
 - `film_command`: `film`, a film of finished frames
 - `sources_command`: `sources`, the lights found in a plate
 - `ghosts_command`: `ghosts`, the ghost analysis of a lens
+- `kept_glare`: `kept_glare`, the veiling glare index of a command that resumes
 - `ghost_sweep`: its `--sweep` over fields, wavelengths and f-numbers
 """

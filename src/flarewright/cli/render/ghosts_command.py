@@ -6,7 +6,8 @@ import csv
 import io
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from contextlib import AbstractContextManager
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -21,15 +22,18 @@ from ..common import (
     pair,
     picture_size,
     print_json,
+    print_remark,
     print_remarks,
 )
 from ..option_record import with_options
 from ..shared_options import FNumber, Json, KnownLens, Zoom
+from .kept_glare import kept_glare
 
 if TYPE_CHECKING:
     from ...model import Lens, Project
     from ...optics.rays.ghost_table import GhostQuery, GhostRow, GhostTable
-    from ...workflow.ghost_sweep import SweepPoint
+    from ...render.analysis_memory import AnalysisMemory
+    from ...render.scene.resolve import ResolvedProject
 
 EPILOG = (
     "Examples:\n\nflarewright ghosts heliar-tronnier --light 10,0\n\n"
@@ -146,15 +150,17 @@ def ghosts(options: GhostsOptions) -> None:
     )  # fmt: skip
     if options.sweep:
         print_remarks(dict.fromkeys((*opened.remarks, *settled.remarks)))
-        _sweep(options, project, query, opened.lens.name)
+        _sweep(options, project, settled, query)
         return
-    with one_bar("ghosts") as progress:
-        table, found = find_ghosts(settled.lens, settled.order, settled.coating, query, progress=progress)
     veil = None
-    if options.glare:
-        from ...render.scattering.veiling_glare import veiling_glare
-
-        veil = veiling_glare(project, options.wavelength_nm)
+    with _kept(options, settled, query) as memory:
+        with one_bar("ghosts") as progress:
+            table, found = find_ghosts(
+                settled.lens, settled.order, settled.coating, query, progress=progress, memory=memory
+            )
+        if options.glare:
+            with one_bar("veiling glare") as progress:
+                veil = kept_glare(project, options.wavelength_nm, progress=progress)
     print_remarks(dict.fromkeys((*opened.remarks, *settled.remarks, *found)))
     if options.as_csv:
         print(table_csv(table, options.brightest), end="")
@@ -252,21 +258,29 @@ def _check_sweep(options: GhostsOptions) -> None:
         )
 
 
-def _sweep(options: GhostsOptions, project: Project, query: GhostQuery, name: str) -> None:
+def _kept(options: GhostsOptions, settled: ResolvedProject, *inputs: Any) -> AbstractContextManager[AnalysisMemory]:
+    """Keep the finished ghosts in the state folder until the block is done; `inputs` determine them with the lens."""
+    from ..._version import __version__
+    from ...render.image.partial_picture import digest_of
+    from ...workflow.kept_work.kept_analysis import kept_analysis
+    from ...workflow.kept_work.unnamed_work import unnamed_file
+
+    # how the ghosts are printed does not change them
+    command = repr(replace(options, as_json=False, as_csv=False, brightest=None))
+    digest = digest_of(__version__, settled.lens, settled.order, settled.coating, inputs)
+    return kept_analysis(unnamed_file(f"ghosts {command}"), digest, print_remark)
+
+
+def _sweep(options: GhostsOptions, project: Project, settled: ResolvedProject, query: GhostQuery) -> None:
     """Analyse the ghosts at every point of a sweep, and print the result."""
     from ...workflow.ghost_sweep import along, surface_gains, sweep_ghosts
     from .ghost_sweep import print_sweep, sweep_axes, sweep_csv, sweep_data
 
     axes = sweep_axes(options.sweep or ())
     fields = (query.field_deg,) if axes.field is None else along(query.field_deg, axes.field)
-    wavelengths, f_numbers = axes.wavelength or (query.wavelength_nm,), axes.fstop or (options.fstop,)
-    number = len(fields) * len(wavelengths) * len(f_numbers)
-    points: list[SweepPoint] = []
-    with one_bar("sweep") as progress:
-        for point in sweep_ghosts(project, query, fields, wavelengths, f_numbers):
-            points.append(point)
-            if progress is not None:
-                progress(len(points) / number, f"{len(points)} of {number}")
+    swept = fields, axes.wavelength or (query.wavelength_nm,), axes.fstop or (options.fstop,)
+    with _kept(options, settled, query, swept) as memory, one_bar("sweep") as progress:
+        points = list(sweep_ghosts(project, query, *swept, memory=memory, progress=progress))
     if options.as_csv:
         print(sweep_csv(points), end="")
         return
@@ -274,7 +288,7 @@ def _sweep(options: GhostsOptions, project: Project, query: GhostQuery, name: st
     if options.as_json:
         print_json(sweep_data(points, gains))
     else:
-        print_sweep(name, points, gains)
+        print_sweep(settled.opened.lens.name, points, gains)
 
 
 def ghost_data(table: GhostTable, brightest: int | None = None) -> dict[str, Any]:

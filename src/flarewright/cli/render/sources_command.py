@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass
+import os
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -126,11 +127,15 @@ def _marked_pattern(text: str | None, settings: PlateSettings, frames: tuple[int
 
 
 def _kept(options: SourcesOptions) -> Path | None:
-    """Return the file for partial work, beside the output; without one a repeated command starts again."""
+    """Return the file for partial work, beside the output or in the state folder; None if that cannot be written."""
+    from ...workflow.kept_work.unnamed_work import unnamed_file
     from ...workflow.plates.plate_sources import sources_file
 
     output = options.table or options.marked
-    return None if output is None else sources_file(str(output), "lights")
+    if output is not None:
+        return sources_file(str(output), "lights")
+    file = unnamed_file(f"sources {replace(options, as_json=False)!r}")
+    return file if os.access(file.parent, os.W_OK) else None
 
 
 def _check_table(path: Path | None) -> None:

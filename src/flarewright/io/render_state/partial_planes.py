@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from ...typing import Floats, Pixels
-from ..files.atomic_write import write_atomically
-from ..files.door import outside_arrays
+from ..files.door import sentences_for
+from .kept_arrays import read_arrays, write_arrays
 
 Planes = list[Pixels | Floats | None]
 
-_WHAT, _REMEDY = "part of a picture", "it is drawn again"
+WHAT, REMEDY = "part of a picture", "it is drawn again"
+"""For messages about a damaged file."""
 
 
 def write_planes(path: Path, digest: str, steps: int, planes: Sequence[Pixels | Floats | None]) -> None:
@@ -36,27 +33,8 @@ def write_planes(path: Path, digest: str, steps: int, planes: Sequence[Pixels | 
     OutputError
         When the file cannot be written.
     """
-    about = json.dumps({"digest": digest, "steps": steps, "planes": len(planes)})
-    arrays: dict[str, Any] = {f"plane.{k}": plane for k, plane in enumerate(planes) if plane is not None}
-
-    def write(temporary: Path) -> None:
-        # a file object keeps NumPy from adding its own suffix
-        with temporary.open("wb") as file:
-            np.savez(file, about=np.array(about), **arrays)
-
-    write_atomically(path, write)
-
-
-def digest_in(path: Path) -> str:
-    """Return the digest of a file.
-
-    Raises
-    ------
-    FileError
-        When the file is damaged.
-    """
-    with outside_arrays(path, _WHAT, _REMEDY) as archive:
-        return str(json.loads(str(archive["about"]))["digest"])
+    arrays = {f"plane.{k}": plane for k, plane in enumerate(planes) if plane is not None}
+    write_arrays(path, digest, arrays, steps=steps, planes=len(planes))
 
 
 def read_planes(path: Path) -> tuple[int, Planes]:
@@ -72,8 +50,6 @@ def read_planes(path: Path) -> tuple[int, Planes]:
     FileError
         When the file is damaged.
     """
-    with outside_arrays(path, _WHAT, _REMEDY) as archive:
-        about = json.loads(str(archive["about"]))
-        names = [f"plane.{k}" for k in range(about["planes"])]
-        planes: Planes = [archive[name] if name in archive.files else None for name in names]
-        return int(about["steps"]), planes
+    about, arrays = read_arrays(path, WHAT, REMEDY)
+    with sentences_for(path, WHAT, REMEDY):
+        return int(about["steps"]), [arrays.get(f"plane.{k}") for k in range(about["planes"])]

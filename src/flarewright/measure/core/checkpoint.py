@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 import json
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -25,6 +25,8 @@ from ...io.files.door import outside
 from ...model.base import Frozen
 from ...model.measurement.ghost_model import Blades
 from ...model.measurement.sprite import Sprite
+from ...sentences import count
+from ...typing import Report
 
 Result = TypeVar("Result")
 
@@ -116,7 +118,7 @@ def _write_error(name: str | Path, error: OSError) -> OutputError:
 
 
 @contextmanager
-def journal(path: Path, digest: str) -> Iterator[Journal]:
+def journal(path: Path, digest: str, report: Report = lambda _: None) -> Iterator[Journal]:
     """Open the journal of a stage. Success removes the file; an interrupted stage keeps it with its steps.
 
     Parameters
@@ -124,6 +126,8 @@ def journal(path: Path, digest: str) -> Iterator[Journal]:
     path : Path
     digest : str
         Digest of all inputs of the stage; a journal with another digest is discarded.
+    report : callable, optional
+        Called with a sentence when a journal is discarded, or a damaged part of it.
 
     Raises
     ------
@@ -131,7 +135,7 @@ def journal(path: Path, digest: str) -> Iterator[Journal]:
         When the file cannot be written.
     """
     head = {"journal": 12, "version": __version__, "digest": digest}
-    known = _read(path, head)
+    known = _read(path, head, report)
     text = "".join(_line(one) for one in (head, *known))
 
     # rewrite the file without a last line that an interruption cut short
@@ -153,17 +157,32 @@ def journal(path: Path, digest: str) -> Iterator[Journal]:
             path.unlink(missing_ok=True)
 
 
-def _read(path: Path, head: dict[str, Any]) -> list[Any]:
+def _read(path: Path, head: dict[str, Any], report: Report) -> list[Any]:
+    """Return the steps of a journal with this head, up to the first that is cut or damaged."""
+    if not path.exists():
+        return []
     try:
         with outside(path, "a journal") as file:
             lines = file.read().decode("utf-8").replace("\r\n", "\n").splitlines(keepends=True)
     except FileError:
+        lines = []
+    found = _whole(lines)
+    if not found:
+        report(f"{path} is damaged; its steps are repeated")
+    elif found[0] != head:
+        report(f"{path} belongs to other settings; its steps are repeated")
         return []
+    elif len(found) < len(lines):
+        report(f"{path} is damaged after {count(len(found) - 1, 'step')}; later ones are repeated")
+    return found[1:]
+
+
+def _whole(lines: Sequence[str]) -> list[Any]:
+    """Decode lines up to the first that is cut or damaged."""
     found: list[Any] = []
     for line in lines:
         text = line[_SUM:].removesuffix("\n")
         if line != f"{_checksum(text)} {text}\n":
-            # cut or damaged
             break
         try:
             one = json.loads(text)
@@ -173,7 +192,7 @@ def _read(path: Path, head: dict[str, Any]) -> list[Any]:
         except (ValueError, KeyError, TypeError):
             break
         found.append(one)
-    return found[1:] if found and found[0] == head else []
+    return found
 
 
 def _line(value: Any) -> str:

@@ -20,9 +20,9 @@ from flarewright.model.lens.iris import Iris
 from flarewright.model.project.starburst import Dirt
 
 from ...typing import Floats
-from ..pupil.dirt import Elements, Veil, VeilTerm, generate_dirt, scattered, spread_area
+from ..pupil.dirt import DARK_DEPTH, Elements, Veil, VeilTerm, generate_dirt, mean_depth, scattered, spread_area
 from ..pupil.iris import blade_edges
-from ..pupil.pupil_function import FFT_SIZE, WINDOW, Pupil, PupilImage, pupil_amplitude
+from ..pupil.pupil_function import BLOCKED, FFT_SIZE, WINDOW, Pupil, PupilImage, pupil_amplitude
 
 CORE_REACH = 60.0
 """Largest s of the core, a third of Nyquist: aliasing is 0.2 % there."""
@@ -207,6 +207,9 @@ def _pattern(
     spacing = WINDOW / FFT_SIZE
     reach = math.ceil(CORE_REACH * WINDOW)
     s = np.arange(-reach, reach + 1) / WINDOW
+    if dirt is not None and mean_depth(dirt) > DARK_DEPTH:
+        # before millions of pieces are drawn
+        raise ValueError(BLOCKED)
     elements = None if dirt is None else generate_dirt(dirt, radius_mm, turn)
     pupil = pupil_amplitude(iris, mask, span, radius_mm, elements, dirt_image, turn)
     P = _power(pupil.amplitude, reach)

@@ -12,10 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model.project.starburst import Dirt
-from ...typing import Floats, Mask
+from ...typing import Floats, Indices, Mask
 
 FIELD = 1.65
 """Radius of the dirt, in radii of the opening: beyond the corners of any iris."""
+
+DARK_DEPTH = 25.0
+"""Depth of dirt (`mean_depth`) that leaves no light: 1e-11 on average."""
 
 # fingerprint: ridge spacing, droplet diameter and spacing along ridges, half axes of the oval
 _RIDGE_MM, _DROPLET_MM, _DROPLET_STEP_MM, _PRINT_MM = 0.5, 0.06, 0.15, (7.0, 9.0)
@@ -29,8 +32,8 @@ _CLASSES = 6
 RAGGED = 0.1
 """Rms deviation of each edge of a scratch from its line, in widths; it damps the fringes with their order."""
 
-# correlation length of that deviation, in widths
-_RAGGED_STEP = 2.0
+# correlation length of that deviation, in widths; largest number of steps along a scratch
+_RAGGED_STEP, _MOST_KNOTS = 2.0, 100_000
 # order of a scratch's fringes beyond which none remain
 _LAST_ORDER = 6.0
 
@@ -121,6 +124,21 @@ def generate_dirt(dirt: Dirt, radius_mm: float, turn: float = 0.0) -> Elements:
     return Elements(found, bands)
 
 
+def mean_depth(dirt: Dirt) -> float:
+    """Return the mean area of dust and scratches per area of the stop: pieces at random pass exp(-depth) of the light.
+
+    Notes
+    -----
+    The coverage of a plane by pieces at random places, a Boolean model (Chiu, Stoyan, Kendall, Mecke: Stochastic
+    Geometry and its Applications, section 3.1). A log-uniform diameter from a to b has the mean square
+    (b^2 - a^2) / (2 log(b / a)).
+    """
+    low, high = (1e-3 * diameter for diameter in dirt.dust_um)
+    square = (high**2 - low**2) / (2.0 * math.log(high / low)) if high > low else low**2
+    dust = dirt.dust_per_mm2 * math.pi / 4.0 * square
+    return dust + 1e-2 * dirt.scratches_per_cm2 * dirt.scratch_mm * 1e-3 * dirt.scratch_um
+
+
 def _tiles(seed: int, kind: int, side: float, reach: float) -> list[tuple[np.random.Generator, Floats]]:
     """Return the squares that cover a disc, each with a random generator and its lower left corner."""
     last = math.ceil(reach / side)
@@ -180,23 +198,65 @@ def rasterise(elements: Elements, at: Floats) -> tuple[Floats, Floats]:
         total = cover.sum()
         cover *= min(math.pi * (radius / spacing) ** 2 / total, 1.0 / cover.max()) if total > 0.0 else 0.0
         _cover(amplitude, light, rows, columns, cover, part)
-    for x, y, normal, length, width, bend in elements.arcs:
-        rows, columns, px, py = _window(at, x, y, 0.5 * length + width + 2.0 * spacing)
-        if not px.size or not py.size:
-            continue
-        # an arc of radius R = length / (2 bend) with its middle at (x, y)
-        R = length / (2.0 * bend)
-        qx, qy = px - (x - R * math.cos(normal)), py[:, None] - (y - R * math.sin(normal))
-        turn = np.arctan2(qy, qx) - normal
-        off = np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi)
-        ends = _softened((R * (off - bend)) / spacing)
-        # a band narrower than a sample keeps its area
-        drawn = max(0.5 * width, 0.5 * spacing)
-        inner, outer = _ragged(turn * R, length, width, bend)
-        across = np.abs(np.hypot(qx, qy) - R - 0.5 * (outer - inner))
-        cover = _softened((across - drawn - 0.5 * (outer + inner)) / spacing) * ends * (0.5 * width / drawn)
-        _cover(amplitude, light, rows, columns, cover, 0.0)
+    for arc in elements.arcs:
+        _scratch(arc, at, amplitude, light)
     return amplitude, light
+
+
+def _scratch(arc: Floats, at: Floats, amplitude: Floats, light: Floats) -> None:
+    """Draw a scratch, in place."""
+    x, y, normal, length, width, bend = arc.tolist()
+    spacing = float(at[1] - at[0])
+    # an arc of radius R = length / (2 bend) with its middle at (x, y)
+    R = length / (2.0 * bend)
+    centre = x - R * math.cos(normal), y - R * math.sin(normal)
+    # a band narrower than a sample keeps its area
+    drawn = max(0.5 * width, 0.5 * spacing)
+    edges = _ragged_edges(length, width, bend)
+    far = drawn + float(np.abs(edges[1:]).max(initial=0.0)) + spacing
+    rows, columns, *_ = _window(at, x, y, 0.5 * length + width + 2.0 * spacing)
+    row, column = _near_arc(at, rows, columns, (*centre, normal), R, far)
+    qx, qy = at[column] - centre[0], at[row] - centre[1]
+    off_arc = np.hypot(qx, qy) - R
+    near = np.abs(off_arc) < far
+    row, column, qx, qy, off_arc = row[near], column[near], qx[near], qy[near], off_arc[near]
+    turn = np.arctan2(qy, qx) - normal
+    off = np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi)
+    ends = _softened((R * (off - bend)) / spacing)
+    inner, outer = (np.interp(turn * R, edges[0], edge) for edge in edges[1:])
+    across = np.abs(off_arc - 0.5 * (outer - inner))
+    cover = _softened((across - drawn - 0.5 * (outer + inner)) / spacing) * ends * (0.5 * width / drawn)
+    amplitude[row, column] *= 1.0 - cover
+    light[row, column] *= 1.0 - cover
+
+
+def _near_arc(
+    at: Floats, rows: slice, columns: slice, circle: tuple[float, float, float], R: float, far: float
+) -> tuple[Indices, Indices]:
+    """Return rows and columns of the samples of a window that can lie within `far` of a short arc of a circle.
+
+    `circle` is the centre, and the direction in which the arc's middle lies from there. Beside the arc are a few
+    samples per line of the grid, so the cost rises with its length, not with its square.
+    """
+    x, y, normal = circle
+    steep = abs(math.cos(normal)) >= abs(math.sin(normal))
+    lines, beside = (rows, columns) if steep else (columns, rows)
+    across, along = (x, y) if steep else (y, x)
+    side = math.copysign(1.0, math.cos(normal) if steep else math.sin(normal))
+    line, first = np.arange(lines.start, lines.stop), np.full(lines.stop - lines.start, beside.start)
+    number = beside.stop - beside.start
+    if far < 0.1 * R:
+        # the ring between R - far and R + far, on the arc's side of the circle
+        squares = (at[line] - along) ** 2
+        ends = [across + side * np.sqrt(np.maximum((R + step) ** 2 - squares, 0.0)) for step in (-far, far)]
+        low, high = np.minimum(*ends), np.maximum(*ends)
+        # one sample more on each side, for rounding
+        first = np.searchsorted(at, low) - 1
+        number = int((np.searchsorted(at, high) + 1 - first).max(initial=0))
+    there = first[:, None] + np.arange(number)
+    inside = (there >= beside.start) & (there < beside.stop)
+    found = np.broadcast_to(line[:, None], there.shape)[inside], there[inside]
+    return found if steep else (found[1], found[0])
 
 
 def _cover(amplitude: Floats, light: Floats, rows: slice, columns: slice, cover: Floats, part: float) -> None:
@@ -204,12 +264,12 @@ def _cover(amplitude: Floats, light: Floats, rows: slice, columns: slice, cover:
     light[rows, columns] *= 1.0 - (1.0 - part) * cover
 
 
-def _ragged(along: Floats, length: float, width: float, bend: float) -> tuple[Floats, Floats]:
-    """Return the random deviation of a scratch's two edges at positions along it, seeded by its bend."""
-    knots = np.arange(-0.6 * length, 0.6 * length, _RAGGED_STEP * width)
+def _ragged_edges(length: float, width: float, bend: float) -> Floats:
+    """Return positions along a scratch and the random deviations of its two edges there, seeded by its bend; (3, K)."""
+    knots = np.arange(-0.6 * length, 0.6 * length, max(_RAGGED_STEP * width, 1.2 * length / _MOST_KNOTS))
     # linear interpolation between knots keeps two thirds of the variance
     heights = np.random.default_rng(int(1e12 * bend)).normal(0.0, RAGGED * width * math.sqrt(1.5), (2, len(knots)))
-    return np.interp(along, knots, heights[0]), np.interp(along, knots, heights[1])
+    return np.stack([knots, *heights])
 
 
 def _softened(distance: Floats) -> Floats:

@@ -20,6 +20,9 @@ FFT_SIZE = 4096
 WINDOW = 12.0
 """Width of the zero-padded pupil plane in pupil radii; the step in s is 1 / WINDOW, the Nyquist frequency 171."""
 
+BLOCKED = "the dirt blocks all light; use less of it"
+"""Sentence on dirt that leaves no light."""
+
 PUPIL_REACH = 1.65
 """Largest radius of an opening: the corner of a straight triangle is at 1.56."""
 
@@ -129,7 +132,7 @@ def pupil_amplitude(
         kept, passing = kept * np.sqrt(clear), passing * clear
     left = float((opening * passing).sum()) * spacing**2
     if not left > 1e-6 * light:
-        raise ValueError("the dirt blocks all light; use less of it")
+        raise ValueError(BLOCKED)
     weight = float(amplitude.sum())
     return Pupil(
         at, opening, amplitude * kept, left, left / light, float((amplitude * kept).sum()) / weight, spread, drawn

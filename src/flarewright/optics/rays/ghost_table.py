@@ -176,6 +176,7 @@ def ghost_table(
     others: Sequence[LightPath] = (),
     threads: int | None = None,
     progress: Progress | None = None,
+    measured: dict[str, GhostRow] | None = None,
 ) -> GhostTable:
     """Analyse all two-reflection ghosts of a lens for one light, and the given paths of four reflections.
 
@@ -191,6 +192,9 @@ def ghost_table(
         None: all cores; results do not depend on it.
     progress : callable, optional
         Called after each path with the finished fraction (0 to 1) and the path's name.
+    measured : dict of str to GhostRow, optional
+        Finished rows of an interrupted call with the same arguments, by name, their peaks per unit of light; the
+        finished rows of this one are put in.
 
     Returns
     -------
@@ -206,16 +210,23 @@ def ghost_table(
     light = incidence(query.field_deg, query.distance, order.entrance_pupil_z)
     packed = facing(packed, light.axes, light.nearness)
     todo = (direct_path(lens), *ghost_paths(lens, query.paths, sensor=query.sensor is not None), *others)
-    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        measured = []
-        for row in pool.map(lambda path: _measure(lens, packed, path, light), todo):
-            measured.append(row)
+    known = {} if measured is None else measured
+    missing = [path for path in todo if path.name not in known]
+    pool = ThreadPoolExecutor(threads or os.cpu_count())
+    try:
+        rows_of_missing = pool.map(lambda path: _measure(lens, packed, path, light), missing)
+        for left, row in zip(reversed(range(len(missing))), rows_of_missing, strict=True):
+            known[row.name] = row
             if progress is not None:
-                progress(len(measured) / len(todo), row.name)
-    direct = measured[0]
+                progress(1.0 - left / len(todo), row.name)
+    finally:
+        # an interruption drops the paths that are still waiting
+        pool.shutdown(cancel_futures=True)
+    rows = [known[path.name] for path in todo]
+    direct = rows[0]
     # peaks are relative to the direct image's flux; without one they are 0
     unit = direct.throughput_mm2 if direct.throughput_mm2 > 0.0 else float("inf")
-    rows = [replace(row, peak_irradiance=row.peak_irradiance / unit) for row in measured]
+    rows = [replace(row, peak_irradiance=row.peak_irradiance / unit) for row in rows]
     ghosts = sorted(rows[1:], key=lambda row: -row.throughput_mm2)
     return GhostTable(
         efl=order.efl,

@@ -20,7 +20,8 @@ from pydantic import BaseModel
 from ..._version import __version__
 from ...errors import FileError, OutputError
 from ...io.files.door import read_limit_bytes
-from ...io.render_state.partial_planes import digest_in, read_planes, write_planes
+from ...io.render_state.kept_arrays import Arrays, digest_in, read_arrays, write_arrays
+from ...io.render_state.partial_planes import REMEDY, WHAT, read_planes, write_planes
 from ...typing import Report
 from .canvas import Canvas
 
@@ -66,7 +67,7 @@ class PartialPicture:
         self._name, self._digest = name, digest_of(__version__, *inputs)
         for path in self.folder.glob(f"{name}-*.npz"):
             try:
-                other = digest_in(path) != self._digest
+                other = digest_in(path, WHAT, REMEDY) != self._digest
                 reason = f"{path} belongs to other settings; it is drawn again"
             except FileError as error:
                 other, reason = True, str(error)
@@ -90,17 +91,38 @@ class PartialPicture:
 
     def store(self, name: str, steps: int, canvas: Canvas) -> bool:
         """Write a canvas; return False, after one sentence, if that is impossible."""
+        size = sum(plane.nbytes for plane in canvas.planes if plane is not None)
+        return self._store(size, lambda: write_planes(self._file(name), self._digest, steps, canvas.planes))
+
+    def load_arrays(self, name: str) -> Arrays | None:
+        """Return the arrays of an earlier run; None if there are none, or damaged ones."""
+        path = self._file(name)
+        if not path.exists():
+            return None
+        try:
+            _, arrays = read_arrays(path, WHAT, REMEDY)
+        except FileError as error:
+            self._say("damaged", str(error))
+            return None
+        self._say("resuming", f"{self.folder}: resuming an interrupted run")
+        return arrays
+
+    def store_arrays(self, name: str, arrays: Arrays) -> bool:
+        """Write arrays; return False, after one sentence, if that is impossible."""
+        size = sum(array.nbytes for array in arrays.values())
+        return self._store(size, lambda: write_arrays(self._file(name), self._digest, arrays))
+
+    def _store(self, size: int, write: Callable[[], None]) -> bool:
         if "failed" in self._said:
             return False
         started = monotonic()
         try:
-            size = sum(plane.nbytes for plane in canvas.planes if plane is not None)
             if size > read_limit_bytes():
                 raise OutputError(
                     f"{size / 1e6:.0f} MB are more than a later run would read (FLAREWRIGHT_READ_LIMIT_MB)"
                 )
             self.folder.mkdir(exist_ok=True)
-            write_planes(self._file(name), self._digest, steps, canvas.planes)
+            write()
         except (OutputError, OSError) as error:
             self._say("failed", f"no checkpoint: {error}")
             return False

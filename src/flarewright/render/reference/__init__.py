@@ -9,4 +9,6 @@ Modules:
 - `shot_arrays`: a shot as the kernels of random rays read it
 - `energy_ledger`: `ledger_of`, `trace_ledger`: where the light that entered the lens ends
 - `four_reflections`: `find_four_reflections`, `find_four_reflections_unbounded`: the bright four-reflection paths
+- `search_sums`: `SearchSums`: what that search has found after its batches so far
+- `kept_search`: `search_kept`: that search for a picture that keeps its finished part
 """

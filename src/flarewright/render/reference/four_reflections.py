@@ -11,8 +11,6 @@ import os
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from itertools import islice
-from math import ceil
 
 import numpy as np
 
@@ -27,11 +25,10 @@ from ...typing import Progress
 from ..scene.opening import Opening
 from ..scene.shot import Shot
 from .batches import Batch, batches_in_order, ray_source, run_batch
+from .search_sums import SearchSums
 
 # points per batch, squared; the pilot batches determine how many batches are needed
 SIDE, PILOT = 24, 4
-# mean number of rays that meet a path at the limit; its estimate then has an error of about 1/7
-HITS = 50
 # paths above this part of the limit are passed on to the deterministic pre-pass, which decides
 MARGIN = 0.5
 # the share of paths that are left out is estimated from the number of search batches divided by this
@@ -94,6 +91,7 @@ def find_four_reflections(
     which: str = "all",
     threads: int | None = None,
     progress: Progress | None = None,
+    sums: SearchSums | None = None,
 ) -> FourReflections:
     """Search the four-reflection paths that bring light into the picture.
 
@@ -110,21 +108,25 @@ def find_four_reflections(
         None: all cores. The result does not depend on it.
     progress : callable, optional
         Called after each batch of rays with the finished fraction (0 to 1) and a description.
+    sums : SearchSums, optional
+        Of an interrupted search with the same arguments; the batches of this one are added to it.
     """
     sources = [ray_source(shot, seed, side=SIDE, light=k, followed=FOLLOWED) for k, shot in enumerate(shots)]
-    search, estimate = _Tally(), _Tally()
+    sums = SearchSums() if sums is None else sums
     at_once = min(threads or os.cpu_count() or 1, PILOT)
-    results = batches_in_order(lambda k: run_batch(sources, k, picture=False, fours=ROOM), 0, at_once)
+    results = batches_in_order(lambda k: run_batch(sources, k, picture=False, fours=ROOM), sums.batches, at_once)
     with closing(results):
-        for result in islice(results, PILOT):
-            search.add(result)
-        wanted = search.batches_for(limit)
-        batches = min(wanted, MOST_BATCHES)
-        more = max(PILOT, batches // ESTIMATE_DIVISOR)
-        for k, result in enumerate(islice(results, batches - PILOT + more)):
-            (search if k < batches - PILOT else estimate).add(result)
+        while sums.batches < PILOT:
+            _add(sums, next(results), choosing=True)
+        if sums.wanted is None:
+            sums.wanted = sums.search.batches_for(limit)
+        batches = min(sums.wanted, MOST_BATCHES)
+        every = batches + max(PILOT, batches // ESTIMATE_DIVISOR)
+        while sums.batches < every:
+            _add(sums, next(results), choosing=sums.batches < batches)
             if progress is not None:
-                progress((PILOT + k + 1) / (batches + more), "four reflections")
+                progress(sums.batches / every, "four reflections")
+    search, estimate = sums.search, sums.estimate
     rows = len(shots[0].packed.curvature)
     bright = [key for key, flux in search.flux.items() if flux > MARGIN * limit * search.two]
     bright.sort(key=lambda key: (-search.flux[key], key))
@@ -135,7 +137,7 @@ def find_four_reflections(
         for key, path in met.items()
         if estimate.two > 0.0 and _is_wanted(path, lens.stop_row, which)
     }
-    return FourReflections(tuple(paths), flux, wanted > MOST_BATCHES)
+    return FourReflections(tuple(paths), flux, sums.wanted > MOST_BATCHES)
 
 
 def find_four_reflections_unbounded(
@@ -145,6 +147,7 @@ def find_four_reflections_unbounded(
     *,
     threads: int | None = None,
     progress: Progress | None = None,
+    sums: SearchSums | None = None,
 ) -> FourReflections:
     """Search the four-reflection paths that bring light to an unbounded sensor plane, through a round stop.
 
@@ -155,7 +158,7 @@ def find_four_reflections_unbounded(
         At one wavelength, not yet rotated to the light.
     query : GhostQuery
     threads : int, optional
-    progress : callable, optional
+    progress, sums
         As of `find_four_reflections`.
     """
     seen, semi = incidence(query.field_deg, query.distance, packed.first_order.entrance_pupil_z), packed.stop_semi
@@ -167,39 +170,13 @@ def find_four_reflections_unbounded(
     plane = np.array([0.5, 0.5, 1e-9, 1e-9])
     shot = Shot(line, seen, facing(packed, seen.axes, seen.nearness), opening, plane, (1, 1), "rec709")
     return find_four_reflections(
-        lens, [shot], query.order4_limit, 0, which=query.paths, threads=threads, progress=progress
+        lens, [shot], query.order4_limit, 0, which=query.paths, threads=threads, progress=progress, sums=sums
     )
 
 
-class _Tally:
-    """Flux of four-reflection paths in the picture, summed over batches."""
-
-    def __init__(self) -> None:
-        self.batches, self.two = 0, 0.0
-        self.flux: dict[int, float] = {}
-        self._sums = np.zeros(2)
-
-    def add(self, result: Batch) -> None:
-        """Add a batch."""
-        keys, weights = result["fours"][:, 0].astype(np.int64), result["fours"][:, 1]
-        names, place = np.unique(keys, return_inverse=True)
-        sums = np.bincount(place, weights=weights, minlength=len(names))
-        for key, value in zip(names.tolist(), sums.tolist(), strict=True):
-            self.flux[key] = self.flux.get(key, 0.0) + value
-        self.batches += 1
-        self.two += float(result["figures"][IN_PICTURE + 1])
-        self._sums += weights.sum(), (weights**2).sum()
-
-    def batches_for(self, limit: float) -> int:
-        """Return the number of batches in which `HITS` rays meet a path at the limit."""
-        flux, squares = self._sums
-        if flux <= 0.0 or self.two <= 0.0:
-            return self.batches
-        # effective flux per ray for the variance of a sum of rays
-        ray = squares / flux
-        needed, least = HITS * ray * self.batches, limit * self.two
-        # the quotient of a tiny limit overflows
-        return max(self.batches, ceil(needed / least) if needed < 1e9 * least else 1_000_000_000)
+def _add(sums: SearchSums, result: Batch, *, choosing: bool) -> None:
+    """Add a batch of rays."""
+    sums.add(result["fours"], float(result["figures"][IN_PICTURE + 1]), choosing=choosing)
 
 
 def _is_wanted(path: LightPath, stop_row: int, which: str) -> bool:

@@ -27,7 +27,7 @@ from ...optics.lens.paths import direct_path
 from ...optics.rays.pack import PackedLens, pack_lens
 from ...optics.scattering.brdf import ScatterTables, scatter_tables
 from ...optics.scattering.internal_beams import Beams, trace_beams
-from ...typing import Floats, Pixels
+from ...typing import Floats, Pixels, Progress
 from ..scene.direct_image import DirectImage
 from ..scene.path_color import direct_spectrum
 from ..scene.resolve import ResolvedProject
@@ -161,6 +161,7 @@ def render_scatter(
     tables: Sequence[ScatterTables],
     *,
     threads: int | None = None,
+    progress: Progress | None = None,
 ) -> Layer:
     """Draw the light that surfaces scatter, for every light.
 
@@ -171,6 +172,8 @@ def render_scatter(
         One per light.
     threads : int, optional
         None: all cores. The pixels do not depend on it.
+    progress : callable, optional
+        Called after each light with the finished part (0 to 1) and the name of the step.
 
     Returns
     -------
@@ -186,7 +189,9 @@ def render_scatter(
     total = np.zeros((height, width, 3), dtype=np.float32)
     sampling = COARSE if settled.project.quality.mode == "draft" else FINE
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        for shot, image, table in zip(shots, images, tables, strict=True):
+        for done, (shot, image, table) in enumerate(zip(shots, images, tables, strict=True)):
+            if progress is not None:
+                progress(done / len(shots), "scattered light")
             total += _one_light(settled.lens, shot, image, table, sampling, pool)
     return Layer("scatter", total, (0, 0, width, height))
 

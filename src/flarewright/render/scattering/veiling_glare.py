@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from math import atan, cos, degrees, log, pi, radians, sin, tan
 
 import numpy as np
@@ -15,6 +17,7 @@ from ...optics.rays.bundle import incidence
 from ...optics.rays.pack import facing
 from ...optics.scattering.brdf import ScatterTables
 from ...optics.scattering.veiling_glare import from_surround
+from ...typing import Progress
 from ..scene.opening import make_opening
 from ..scene.resolve import resolve_project
 from ..scene.shot import Shot
@@ -57,7 +60,14 @@ class VeilingGlare:
     wavelength_nm: float
 
 
-def veiling_glare(project: Project, wavelength_nm: float, *, threads: int | None = None) -> VeilingGlare:
+def veiling_glare(
+    project: Project,
+    wavelength_nm: float,
+    *,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    step: Callable[[Callable[[], float]], float] = lambda make: make(),
+) -> VeilingGlare:
     """Compute the veiling glare index of a project's lens.
 
     Parameters
@@ -67,6 +77,11 @@ def veiling_glare(project: Project, wavelength_nm: float, *, threads: int | None
     wavelength_nm : float
     threads : int, optional
         None: all cores. The result does not depend on it.
+    progress : callable, optional
+        Called with the finished part (0 to 1) and the name of the step.
+    step : callable, optional
+        Takes what computes the scattered light of the next direction, and returns that light; it can return the result
+        of an interrupted run instead.
 
     Raises
     ------
@@ -97,17 +112,21 @@ def veiling_glare(project: Project, wavelength_nm: float, *, threads: int | None
         direct = direct * float(tables[0].kept[0])
         with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
 
-            def light_from(low: float, high: float, nodes: int) -> float:
+            def light_from(low: float, high: float, nodes: int, done: int) -> float:
                 at, weights = np.polynomial.legendre.leggauss(nodes)
                 span = log(high / low)
                 angles = low * np.exp(0.5 * span * (at + 1.0))
-                seen = [_scattered_from(lens, shot, tables[0], float(angle), pool) for angle in angles]
+                seen = []
+                for k, angle in enumerate(angles.tolist()):
+                    if progress is not None:
+                        progress((done + k) / (INNER_NODES + OUTER_NODES), "scattered light")
+                    seen.append(step(partial(_scattered_from, lens, shot, tables[0], angle, pool)))
                 rings = 2.0 * pi * np.sin(angles) * np.cos(angles) * angles
                 return float((0.5 * span * weights * rings * np.array(seen)).sum())
 
             edge = atan(patch)
-            within = light_from(LEAST_RAD, edge, INNER_NODES)
-            beyond = light_from(edge, radians(MOST_DEG), OUTER_NODES)
+            within = light_from(LEAST_RAD, edge, INNER_NODES, 0)
+            beyond = light_from(edge, radians(MOST_DEG), OUTER_NODES, INNER_NODES)
     white = float(direct[0] + ghosts[0] + within + beyond)
     unit = 1.0 / white if white > 0.0 else 0.0
     return VeilingGlare(

@@ -12,7 +12,7 @@ from ...errors import FlarewrightError, OutputError
 from ...io.files.atomic_write import make_folder
 from ...io.files.file_lock import held
 from ...typing import Report
-from ..checkpoints import checkpoints
+from ..kept_work.checkpoints import checkpoints
 from .lens_search import LensSearch, search_lenses
 
 if TYPE_CHECKING:

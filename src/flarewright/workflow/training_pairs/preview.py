@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,17 @@ _SIDE_PX = 320
 _GOLDEN = 0.618034
 
 
+Row = list[Figure]
+"""The pictures of one item."""
+
+
 def preview_picture(
-    spec: DatasetSpec, items: int, *, threads: int | None = None, report: Callable[[int, int], None] | None = None
+    spec: DatasetSpec,
+    items: int,
+    *,
+    threads: int | None = None,
+    report: Callable[[int, int], None] | None = None,
+    step: Callable[[Callable[[], Row]], Row] = lambda draw: draw(),
 ) -> NDArray[np.uint8]:
     """Return a contact sheet of the first items of a data set, one in each row.
 
@@ -36,6 +46,8 @@ def preview_picture(
         None: all cores.
     report : callable, optional
         Called after each item with the number of finished items and the number of all.
+    step : callable, optional
+        Takes what draws the next item, and returns its row; it can return that of an interrupted preview instead.
 
     Returns
     -------
@@ -51,7 +63,7 @@ def preview_picture(
     figures: list[Figure] = []
     for index in range(items):
         try:
-            figures += _row(index, draw_pictures(spec, index, backgrounds, threads))
+            figures += step(partial(_row, spec, index, backgrounds, threads))
         except FlarewrightError as error:
             raise type(error)(f"item {index}: {error}", error.problems) from None
         if report is not None:
@@ -59,7 +71,9 @@ def preview_picture(
     return sheet_picture(figures)
 
 
-def _row(index: int, drawn: Pictures) -> Iterator[Figure]:
+def _row(spec: DatasetSpec, index: int, backgrounds: Sequence[str], threads: int | None) -> Row:
+    """Draw an item."""
+    drawn = draw_pictures(spec, index, backgrounds, threads)
     light, tone = drawn.linear, drawn.sensor.tone
     flare = light["starburst"] + light["ghosts"] + light["veil"]
     pictures = (
@@ -73,8 +87,10 @@ def _row(index: int, drawn: Pictures) -> Iterator[Figure]:
         str(record["lens"])[-34:],
         f"{count(len(record['ghosts']), 'ghost')}, {count(len(record['lights']), 'light')}",
     )
-    for picture, title, column in zip(pictures, titles, _COLUMNS, strict=True):
-        yield Figure("", title, "", "", f"{index}-{column}.png", _small(picture))
+    return [
+        Figure("", title, "", "", f"{index}-{column}.png", _small(picture))
+        for picture, title, column in zip(pictures, titles, _COLUMNS, strict=True)
+    ]
 
 
 def _coloured(drawn: Pictures) -> NDArray[np.uint8]:

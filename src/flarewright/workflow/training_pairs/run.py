@@ -192,10 +192,10 @@ def plan_of(spec: DatasetSpec | str | PathLike[str], output: str | PathLike[str]
         raise ProjectError(problems[0], tuple(problems))
     check_lenses(settings)
     backgrounds = list_backgrounds(settings)
-    return DatasetPlan(settings, os.fspath(output), backgrounds, _digest(settings, backgrounds))
+    return DatasetPlan(settings, os.fspath(output), backgrounds, dataset_digest(settings, backgrounds))
 
 
-def _digest(spec: DatasetSpec, backgrounds: Sequence[str]) -> str:
+def dataset_digest(spec: DatasetSpec, backgrounds: Sequence[str]) -> str:
     """Return a digest of all that determines the items: version, specification, lenses, backgrounds."""
     folder = Path(spec.background.folder or ".")
     lenses: dict[str, str] = {}
