@@ -60,6 +60,7 @@ class CrescentSettings:
     compared: int = 400  # number of best candidates of each search that are compared
     most_distance: float = 0.3  # maximum distance of equal candidates, over their mean size in their middle view
     most_size_difference: float = 0.4  # maximum difference of the size of equal candidates, over the larger size
+    most: int = 8  # maximum number of candidates
 
 
 @dataclass(frozen=True)
