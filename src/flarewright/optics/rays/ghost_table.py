@@ -159,10 +159,6 @@ def pack_for_query(lens: Lens, order: FirstOrder, coating: CoatingChoice, query:
         At the opening and focus to be used.
     coating : CoatingChoice
     query : GhostQuery
-
-    Returns
-    -------
-    PackedLens
     """
     coatings = resolve_coatings(lens, coating)
     return pack_lens(lens, order, coatings, np.array([query.wavelength_nm]), sensor=query.sensor)
@@ -191,10 +187,6 @@ def ghost_table(
         None: all cores; results do not depend on it.
     progress : callable, optional
         Called after each path with the finished fraction (0 to 1) and the path's name.
-
-    Returns
-    -------
-    GhostTable
 
     Notes
     -----

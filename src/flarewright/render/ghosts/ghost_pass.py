@@ -165,10 +165,6 @@ def render_ghosts(
         Final quality: keeps the drawn ghosts in files.
     ranking : GhostRanking, optional
         Gets the luminance of each ghost; all are drawn separately then, as for layers of single ghosts.
-
-    Returns
-    -------
-    GhostPass
     """
     art = art or {}
     muted = {name for name, changed in art.items() if not changed.enabled}
@@ -447,10 +443,6 @@ def plain_level(shots: Sequence[Shot], paths: Sequence[LightPath], threads: int 
     paths : sequence of LightPath
     threads : int, optional
         None: all cores.
-
-    Returns
-    -------
-    float
     """
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         groups = pool.map(ghost_search(shots, paths, {}), group_by_mirror(paths))
