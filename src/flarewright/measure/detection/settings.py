@@ -141,6 +141,7 @@ class SplitSettings:
 class PictureSettings:
     """Ghosts of one picture, see `single_image.spots_of_picture`."""
 
+    most: int = 60  # maximum number of ghosts
     enough: float = 0.25  # minimum score of a proposed circle, over the best possible score
     above_chance: float = 1.25  # minimum score of a proposed circle, over the score of chance
     border: float = 0.06  # half width of the band around a found border that later votes exclude, over the radius
