@@ -1,4 +1,4 @@
-"""The ghosts of a picture in final quality: their search, their order and what is left out, drawn in groups."""
+"""The ghosts of a picture in final quality: searched, sorted, without those too faint to show, and drawn in groups."""
 
 from __future__ import annotations
 
