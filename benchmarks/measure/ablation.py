@@ -2,7 +2,7 @@
 
     python -m benchmarks --only residual
     python -m benchmarks.measure --ablation [LENS ...]
-    python -m benchmarks.measure --ablation LENS --layer blobs --width 720 --range 20 28 --count 27 --ghosts 20
+    python -m benchmarks.measure --ablation LENS --layer spikes --width 720 --range 20 28 --count 27 --ghosts 20
 
 A synthetic camera photographs each lens in pictures 240 pixels wide, at the even ones of 21 constellations half a
 degree apart. Ghosts are found and fitted once. Then the residual is learned again without one layer at a time. Each
@@ -94,7 +94,6 @@ LAYERS: dict[str, dict[str, Callable[..., Any]]] = {
     "sprites with the light": {f"{_LEARN}.learn.light_sprites": lambda *_: ()},
     "sprite about the axis": {f"{_LEARN}.learn.axis_sprite": _empty},
     "spikes": {f"{_LEARN}.learn.spike_sprites": lambda *_: ()},
-    "blobs": {f"{_LEARN}.learn.blobs_of": lambda *_: ()},
     "motion warp": {f"{_LEARN}.learn.with_moves": _at_rest},
     "its agreement": {f"{_LEARN}.motion_fit.agree": _unsmoothed},
     "clamping": {f"{_LEARN}.learn.with_reaches": lambda model, *_: model},
