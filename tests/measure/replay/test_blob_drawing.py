@@ -58,14 +58,14 @@ def test_the_outline_of_a_disc_is_where_the_disc_is(run):
 @pytest.mark.parametrize("scale", [0.7, 1.0, 2.0])
 def test_a_picture_keeps_its_light_wherever_it_lies(roll, scale):
     grid = Grid(0.5, (-4.0, -3.0), 12, 16, (2.0, 1.0))
-    at = Outline(30.3, (3.0, 1.5))
+    at = Outline(30.3, (3.6, 1.5))
     picture = np.zeros((12, 16, 3), np.float32)
     picture[3:9, 4:12] = np.random.default_rng(1).random((6, 8, 3))
     size = (round(140 * scale), round(140 * scale))
     out = np.zeros((size[1], size[0], 3), np.float32)
     add_blob(out, grid, at, frame((70.0, 70.0), roll, 5.0, scale), picture)
-    # cells are half a pixel wide, scaled by 1.5 with the ghost's size
-    area = (0.5 * 1.5 * scale) ** 2
+    # cells are half a pixel wide, scaled with the ghost by 1.8 along its line and by 1.5 across
+    area = 0.5 * 1.8 * scale * 0.5 * 1.5 * scale
     assert out.sum(axis=(0, 1)) == pytest.approx(picture.sum(axis=(0, 1)) * area, rel=0.02)
     rows, columns = np.mgrid[: size[1], : size[0]]
     weight = out.sum(axis=2) / out.sum()
@@ -73,7 +73,7 @@ def test_a_picture_keeps_its_light_wherever_it_lies(roll, scale):
     middle = (columns * weight).sum() + 0.5, (rows * weight).sum() + 0.5
     cells_r, cells_c = np.mgrid[:12, :16]
     share = picture.sum(axis=2) / picture.sum()
-    along = at.along + 1.5 * (-4.0 + 0.5 * ((cells_c * share).sum() + 0.5))
+    along = at.along + 1.8 * (-4.0 + 0.5 * ((cells_c * share).sum() + 0.5))
     aside = 1.5 * (-3.0 + 0.5 * ((cells_r * share).sum() + 0.5))
     expected = (
         scale * (70.0 + np.cos(turn) * along + np.sin(turn) * aside),
