@@ -21,7 +21,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.measure.ablation import LENSES, ablation, table
+from benchmarks.measure.ablation import LAYERS, LENSES, Series, ablation, table
 from benchmarks.measure.isolated import isolated, summary
 from benchmarks.measure.judge import judge
 from benchmarks.measure.planted import planted_time
@@ -85,20 +85,30 @@ def main() -> None:
     parser.add_argument("--planted", type=int, metavar="GHOSTS", help="time this number of ghosts, all angles used")
     parser.add_argument("--isolated", action="store_true", help="measure single ghosts and compare with Walch's method")
     parser.add_argument("--ablation", action="store_true", help="measure what each layer of the residual is worth")
-    parser.add_argument("--width", type=int, default=720)
-    parser.add_argument("--count", type=int, default=100, help="number of constellations, even and odd (default: 100)")
+    parser.add_argument("--width", type=int, help="of the pictures, pixels (default: 720; --ablation: 240)")
+    parser.add_argument("--count", type=int, help="number of constellations, even and odd (default: 100, or 21)")
+    parser.add_argument("--range", type=float, nargs=2, help="--ablation: first and last constellation (default: 4 14)")
+    parser.add_argument("--ghosts", type=int, help="--ablation: number of ghosts to search (default: 12)")
+    parser.add_argument("--layer", choices=tuple(LAYERS), action="append", help="--ablation: this layer alone")
     parser.add_argument("--f-number", type=float, default=5.6)
     parser.add_argument("--merge", choices=("real", "ideal"), default="real")
     parser.add_argument("--keep", type=Path, help="folder for photographs and models, reused by later runs")
     parser.add_argument("--json", type=Path, help="write the scores to this file")
     given = parser.parse_args()
+    series = Series(
+        given.width or Series.width, given.count or Series.count, tuple(given.range or Series.range_deg),
+        given.ghosts or Series.most_ghosts,
+    )  # fmt: skip
+    given.width, given.count = given.width or 720, given.count or 100
     rows = [replay_speed()] if given.speed else []
     if given.planted:
         rows.append(planted_time(given.planted, given.count, lambda text: print(text, flush=True)))
     for row in rows:
         print(json.dumps(row), flush=True)
     if given.ablation:
-        rows += ablation(lambda text: print(text, flush=True), given.lens or LENSES)
+        rows += ablation(
+            lambda text: print(text, flush=True), given.lens or LENSES, series, given.layer or tuple(LAYERS)
+        )
         print(table(rows))
     elif given.isolated:
         alone: list[dict[str, Any]] = []

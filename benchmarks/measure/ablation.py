@@ -2,6 +2,7 @@
 
     python -m benchmarks --only residual
     python -m benchmarks.measure --ablation [LENS ...]
+    python -m benchmarks.measure --ablation LENS --layer spikes --width 720 --range 20 28 --count 27 --ghosts 20
 
 A synthetic camera photographs each lens in pictures 240 pixels wide, at the even ones of 21 constellations half a
 degree apart. Ghosts are found and fitted once. Then the residual is learned again without one layer at a time. Each
@@ -47,14 +48,21 @@ from flarewright.typing import Floats, Pixels, Report
 
 LENSES = ("speed-panchro-50", "flektogon-35", "takumar-50-f1.4")
 SCORES = ("between, linear", "between, log", "rolled, linear", "rolled, log")
-WIDTH, COUNT = 240, 21
-# largest number of ghosts: a fit of all would take minutes
-MOST = 12
-# first and last constellation
-RANGE_DEG = (4.0, 14.0)
 # directions of the light that no photograph showed, and where, part of the constellations
 ROLLS_DEG, AT = (40.0, 160.0), (0.3, 0.7)
 _LEARN, _REPLAY = "flarewright.measure.residual", "flarewright.measure.replay"
+
+
+@dataclass(frozen=True)
+class Series:
+    """How a lens is photographed, and how many of its ghosts are searched."""
+
+    width: int = 240
+    # number of constellations, and the first and the last
+    count: int = 21
+    range_deg: tuple[float, float] = (4.0, 14.0)
+    # a fit of all ghosts would take minutes
+    most_ghosts: int = 12
 
 
 def _at_rest(model: GhostModel, _threads: int | None = None, block: int = 4) -> GhostModel:
@@ -86,7 +94,6 @@ LAYERS: dict[str, dict[str, Callable[..., Any]]] = {
     "sprites with the light": {f"{_LEARN}.learn.light_sprites": lambda *_: ()},
     "sprite about the axis": {f"{_LEARN}.learn.axis_sprite": _empty},
     "spikes": {f"{_LEARN}.learn.spike_sprites": lambda *_: ()},
-    "blobs": {f"{_LEARN}.learn.blobs_of": lambda *_: ()},
     "motion warp": {f"{_LEARN}.learn.with_moves": _at_rest},
     "its agreement": {f"{_LEARN}.motion_fit.agree": _unsmoothed},
     "clamping": {f"{_LEARN}.learn.with_reaches": lambda model, *_: model},
@@ -118,13 +125,13 @@ class Case:
     floor: float
 
 
-def setup_between(lens: str, width: int = WIDTH, count: int = COUNT) -> Setup:
-    """Return a camera behind an iris of eight blades, its captures a degree apart for a picture of 240 pixels."""
-    angles = tuple(np.round(np.linspace(*RANGE_DEG, count), 6).tolist())
-    return replace(setup_of(lens, width, count), angles_deg=angles, blades=8)
+def setup_between(lens: str, series: Series = Series()) -> Setup:
+    """Return a camera behind an iris of eight blades, its captures a degree apart unless the series says otherwise."""
+    angles = tuple(np.round(np.linspace(*series.range_deg, series.count), 6).tolist())
+    return replace(setup_of(lens, series.width, series.count), angles_deg=angles, blades=8)
 
 
-def case_of(setup: Setup, folder: Path, tell: Report) -> Case:
+def case_of(setup: Setup, folder: Path, tell: Report, most_ghosts: int = Series.most_ghosts) -> Case:
     """Photograph a lens, find and fit its ghosts."""
     scale = scale_of(setup)
     frames: list[MergedFrame] = []
@@ -147,7 +154,7 @@ def case_of(setup: Setup, folder: Path, tell: Report) -> Case:
             odd.append((ideal_frame(still, truth, pose).info, truth, True))
     tell(f"{setup.lens}: photographed")
     run = run_of(setup, tuple(frame.info for frame in frames))
-    model = fit_ghosts(folder, run, find_ghosts(folder, run, max_ghosts=MOST), extra_searches=0, residual=False)
+    model = fit_ghosts(folder, run, find_ghosts(folder, run, max_ghosts=most_ghosts), extra_searches=0, residual=False)
     tell(f"{setup.lens}: {len(model.ghosts)} ghosts fitted")
     known = np.concatenate([frame.variance[np.isfinite(frame.variance)] for frame in frames])
     floor = float(np.sqrt(np.median(known)))
@@ -209,8 +216,8 @@ def scores(case: Case, replay: Callable[[Held], Pixels | None]) -> dict[str, flo
     return found
 
 
-def ablate(case: Case, tell: Report) -> dict[str, dict[str, float]]:
-    """Return the scores of a case by row of the table."""
+def ablate(case: Case, tell: Report, layers: Sequence[str] = tuple(LAYERS)) -> dict[str, dict[str, float]]:
+    """Return the scores of a case by row of the table, without each of these layers in turn."""
 
     def of(model: GhostModel) -> Callable[[Held], Pixels]:
         model_image._photographed.cache_clear()
@@ -220,7 +227,7 @@ def ablate(case: Case, tell: Report) -> dict[str, dict[str, float]]:
     for name in ("interpolation", "optical flow", "rotated photograph"):
         rows[name] = scores(case, lambda held, name=name: held.free.get(name))  # type: ignore[misc]
     rows["no residual"] = scores(case, of(case.model))
-    for name, parts in {"all layers": {}, **{f"without {layer}": parts for layer, parts in LAYERS.items()}}.items():
+    for name, parts in {"all layers": {}, **{f"without {layer}": LAYERS[layer] for layer in layers}}.items():
         start = time.process_time()
         with ExitStack() as stack:
             for target, other in parts.items():
@@ -230,13 +237,15 @@ def ablate(case: Case, tell: Report) -> dict[str, dict[str, float]]:
     return rows
 
 
-def ablation(tell: Report, lenses: Sequence[str] = LENSES) -> list[dict[str, Any]]:
+def ablation(
+    tell: Report, lenses: Sequence[str] = LENSES, series: Series = Series(), layers: Sequence[str] = tuple(LAYERS)
+) -> list[dict[str, Any]]:
     """Return the scores of lenses, by row of the table."""
     rows: list[dict[str, Any]] = []
     for lens in lenses:
         with tempfile.TemporaryDirectory() as made:
-            case = case_of(setup_between(lens), Path(made) / "run", tell)
-        rows.append({"lens": lens, "PSNR, dB": ablate(case, tell)})
+            case = case_of(setup_between(lens, series), Path(made) / "run", tell, series.most_ghosts)
+        rows.append({"lens": Path(lens).stem, "PSNR, dB": ablate(case, tell, layers)})
     return rows
 
 

@@ -73,11 +73,13 @@ def shoot(setup: Setup, folder: Path) -> None:
 
 def run_of(setup: Setup, frames: tuple[FrameInfo, ...]) -> MergedRun:
     """Return the index of the perfect merge, with known axis and focal length."""
+    off_axis = [info for info in frames if abs(info.constellation_deg) > 2.0]
+    # distortion is small near the axis
+    near = [info for info in off_axis if abs(info.constellation_deg) < 15.0]
     reach = []
-    for info in frames:
+    for info in near or off_axis:
         x, y = info.light_px[0] - info.axis_px[0], info.light_px[1] - info.axis_px[1]
-        if 2.0 < abs(info.constellation_deg) < 15.0:
-            reach.append(hypot(x, y) / np.tan(np.radians(abs(info.constellation_deg))))
+        reach.append(hypot(x, y) / np.tan(np.radians(abs(info.constellation_deg))))
     return MergedRun(
         size_px=setup.size_px, frames=frames, axis_px=setup.axis_px, px_per_rad=float(np.median(reach)),
         camera=CameraNoise(

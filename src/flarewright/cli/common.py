@@ -217,15 +217,15 @@ def console() -> Console:
 
 
 @contextmanager
-def status_line(words: str) -> Iterator[Report | None]:
-    """Show a changing line on a terminal; yield what changes it, None if not on a terminal."""
+def search_status() -> Iterator[Report | None]:
+    """Show a changing line about a search on a terminal; yield what changes it, None if not on a terminal."""
     if not sys.stderr.isatty():
         yield None
         return
     from rich.console import Console
     from rich.status import Status
 
-    with Status(words, console=Console(stderr=True)) as status:
+    with Status("searching", console=Console(stderr=True)) as status:
         yield status.update
 
 

@@ -124,10 +124,6 @@ def parse_source(text: str) -> SourceKind:
     text : str
         "sun"; "headlight@30", at 30 m; "lamp:800@3", a bulb of 800 lumen at 3 m.
 
-    Returns
-    -------
-    SourceKind
-
     Raises
     ------
     ProjectError

@@ -20,7 +20,8 @@ from ..model.matte import GhostMatte
 from ..optics.lens.paths import ghost_paths
 from ..typing import Floats, Progress
 from .ghosts.cost import CostMeter, RenderProfile
-from .ghosts.ghost_pass import plain_level, render_ghosts
+from .ghosts.final_ghosts import plain_level
+from .ghosts.ghost_pass import render_ghosts
 from .image.compose import beauty
 from .image.gamut import apply_gamut
 from .image.ghost_ranking import RANK_BYTES, GhostRanking, ghost_matte, rank_remarks

@@ -69,7 +69,7 @@ def traits(project: Project) -> set[str]:
         The project cannot be rendered.
     """
     # imported here: the ghost analysis does not need the drawing code
-    from .ghosts.ghost_pass import CROWDED_GHOSTS
+    from .ghosts.draft_ghosts import CROWDED_GHOSTS
 
     settled, quality = resolve_project(project), project.quality
     masked = settled.iris.mask is not None

@@ -40,10 +40,6 @@ def flare_curves(
     processes, cluster, announce
         As of `flare_pictures.pictures_elsewhere`; the curves do not depend on them.
 
-    Returns
-    -------
-    Occurrence
-
     Raises
     ------
     FlarewrightError

@@ -96,10 +96,6 @@ def lights_at_pixels(
         Size of the picture in which the places count, about the same axis; None: the project's. With overscan the
         project's is larger.
 
-    Returns
-    -------
-    Project
-
     Raises
     ------
     ProjectError

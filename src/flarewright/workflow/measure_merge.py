@@ -114,10 +114,6 @@ def merge_on(
     announce : callable, optional
         Called with sentences about the cluster as they arise.
 
-    Returns
-    -------
-    MergedRun
-
     Raises
     ------
     FlarewrightError

@@ -96,10 +96,6 @@ def nuke_script(
     gizmo : str, optional
         Name of a gizmo to write instead of a script: inputs for flare and plate, and a knob for the gain of each pass.
 
-    Returns
-    -------
-    NukeScript
-
     Raises
     ------
     ProjectError

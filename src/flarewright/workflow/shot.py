@@ -141,10 +141,6 @@ def shot(
         The layers have the values of a picture that shows the radiance of the scene, such as a rendered one, and add
         to it as they are: the irradiances of the sensor times 4 N^2 / (pi T).
 
-    Returns
-    -------
-    ShotResult
-
     Raises
     ------
     FlarewrightError

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from test_follow import ANGLES, STRIP, drawn, grey
 
 from flarewright.io.measurement.ghost_model_file import read_ghost_model, write_ghost_model
-from flarewright.kernels.ghost_model.pupil_mesh import BELOW
+from flarewright.kernels.ghost_model.pupil_mesh import BELOW, LATERAL
 from flarewright.measure.compression.order_selection import needed_numbers, parabola
 from flarewright.measure.compression.prune import (
     compact_model,
@@ -67,9 +67,14 @@ def test_a_curve_has_as_many_knots_as_its_values_need():
     assert smooth_curve(at[:2], at[:2], error[:2], (0.0, 20.0), usual=1.0, spread=0.5) is None
 
 
-@pytest.mark.parametrize("extra", [{}, {"soft": True}, {"soft": True, "lateral": True}, {"soft": True, "below": True}])
-def test_stored_uncertainty_marks_the_fitted_parameters(extra):
-    free, numbers = free_numbers(1, 2, 1, **extra), shape(-80.0, 20.0, 0.5).numbers
+@pytest.mark.parametrize(
+    ("soft", "below", "lateral"),
+    [(False, False, ()), (True, False, ()), (True, False, range(LATERAL, BELOW)), (True, True, ())],
+)
+def test_stored_uncertainty_marks_the_fitted_parameters(soft, below, lateral):
+    # a run fits no lateral colour, but a model can hold it
+    free = np.array([*free_numbers(1, 2, 1, soft, below), *lateral])
+    numbers = shape(-80.0, 20.0, 0.5).numbers
     # two discs, their radii
     numbers[[32, 35]] = 1.0
     uncertainty = np.zeros(NUMBERS)

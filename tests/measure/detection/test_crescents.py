@@ -61,7 +61,7 @@ def searched_crescent(speed, roll):
     """Return views of a crescent, their gradients, and the best candidate."""
     shown = views((crescent(speed),), angles=ANGLES, roll_deg=roll)
     found = slopes(shown)
-    return shown, found, crescents(found, SIZE[0], most=1)[0]
+    return shown, found, crescents(found, SIZE[0])[0]
 
 
 @pytest.mark.parametrize("speed", [-260.0, pytest.param(260.0, marks=pytest.mark.slow)])

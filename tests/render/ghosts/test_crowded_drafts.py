@@ -7,7 +7,7 @@ from flarewright.kernels.raster.polygons import sum_rows
 from flarewright.model import Art, Camera, Light, Output, Project, Quality, Rule
 from flarewright.optics.colour.rgb import luminance_weights
 from flarewright.optics.lens.paths import ghost_paths
-from flarewright.render.ghosts import ghost_pass, paraxial_ghosts
+from flarewright.render.ghosts import draft_ghosts, paraxial_ghosts
 from flarewright.render.render import render
 from flarewright.render.scene.opening import make_opening
 from flarewright.render.scene.resolve import resolve_project
@@ -24,7 +24,7 @@ CANON = Project(
 
 
 def sheet(project, monkeypatch, crowd):
-    monkeypatch.setattr(ghost_pass, "CROWDED_GHOSTS", crowd)
+    monkeypatch.setattr(draft_ghosts, "CROWDED_GHOSTS", crowd)
     layer = next(layer for layer in render(project).layers if layer.name == "ghosts")
     x, y, width, height = layer.window
     whole = np.zeros((270, 480, 3))
@@ -77,7 +77,7 @@ def test_brightest_ghosts_keep_all_detail():
 
 
 def test_a_light_that_is_off_says_nothing_of_the_others(monkeypatch):
-    monkeypatch.setattr(ghost_pass, "CROWDED_GHOSTS", 1)
+    monkeypatch.setattr(draft_ghosts, "CROWDED_GHOSTS", 1)
     dark, bright = (Light(field_deg=(x, 3.0), intensity=power) for x, power in ((8.0, 0.0), (4.0, 1.0)))
     together, alone = (render(CANON.replace(lights=lights)) for lights in ((bright, dark), (bright,)))
     sums = [next(one for one in done.layers if one.name == "ghosts").pixels.sum() for done in (together, alone)]

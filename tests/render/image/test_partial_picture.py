@@ -141,11 +141,11 @@ def test_an_interrupted_search_for_four_reflections_resumes(tmp_path, monkeypatc
 
 
 def test_a_resumed_render_draws_only_the_other_ghosts(tmp_path, monkeypatch):
-    from flarewright.render.ghosts import ghost_pass
+    from flarewright.render.ghosts import final_ghosts
 
-    drawn, draw = [], ghost_pass.draw_final
+    drawn, draw = [], final_ghosts.draw_final
     monkeypatch.setattr(
-        ghost_pass, "draw_final", lambda item, *a, **k: (drawn.append(item.path.name), draw(item, *a, **k))
+        final_ghosts, "draw_final", lambda item, *a, **k: (drawn.append(item.path.name), draw(item, *a, **k))
     )
     render(PROJECT, kept=PartialPicture(tmp_path / "whole", print))
     every = len(drawn)

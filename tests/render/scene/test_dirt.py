@@ -90,10 +90,10 @@ def test_veil_of_random_discs_is_the_transform_of_their_picture():
 def test_unit_flux_whatever_lies_on_the_pupil(name, iris):
     pattern = pupil_pattern(iris, radius_mm=8.0, soil=Soil(SOILS[name]))
     size, pitch = (301, 301), 0.18
-    E = starburst_layer(
-        iris, 4.0, (pitch, pitch), size, (150.7, 150.2), WAVES[::2], np.ones((len(WAVES[::2]), 3)), pattern=pattern
+    E = starburst_layer(pattern, 4.0, (pitch, pitch), size, (150.7, 150.2), WAVES[::2], np.ones((len(WAVES[::2]), 3)))
+    clean = starburst_layer(
+        pupil_pattern(iris), 4.0, (pitch, pitch), size, (150.7, 150.2), WAVES[::2], np.ones((len(WAVES[::2]), 3))
     )
-    clean = starburst_layer(iris, 4.0, (pitch, pitch), size, (150.7, 150.2), WAVES[::2], np.ones((len(WAVES[::2]), 3)))
     assert E[..., 0].sum(dtype=float) * pitch**2 / len(WAVES[::2]) == pytest.approx(1.0, abs=2e-3)
     assert 0.8 < pattern.transmittance < 0.9999
     # far from the centre there is more light than without dirt
@@ -198,8 +198,8 @@ def test_roughness_takes_its_share_of_the_spike_and_keeps_the_flux():
         kept.append(spike(rough) / spike(pupil_pattern(Iris(blades=4))))
     s = SPIKE_AT
     assert np.mean(kept, axis=0) == pytest.approx(np.exp(-((2 * np.pi * sigma_um * 1e-3 / radius * s) ** 2)), abs=0.12)
-    E = starburst_layer(iris, *args, pattern=rough)
-    smooth = starburst_layer(Iris(blades=4), *args)
+    E = starburst_layer(rough, *args)
+    smooth = starburst_layer(pupil_pattern(Iris(blades=4)), *args)
     assert E.sum(dtype=float) == pytest.approx(smooth.sum(dtype=float), rel=3e-3)
     # the lost light of the spikes lies between them
     assert E[175:, 200:230].sum() > 3 * smooth[175:, 200:230].sum()
@@ -410,8 +410,8 @@ def test_the_fringes_of_a_scratch_fade_as_colours_mix_and_end_nowhere():
     wide, high = (int(abs(part) * place[-1] / pitch) + 20 for part in (math.cos(direction), math.sin(direction)))
     cx = 10.0 if math.cos(direction) > 0.0 else wide - 10.0
     frame = ((pitch, pitch), (wide, high), (cx, high - 10.0), WAVES, weights)
-    spread_light = starburst_layer(Iris(), N, *frame, pattern=pattern, threads=None)
-    clean = starburst_layer(Iris(), N, *frame, pattern=replace(pattern, veil=()), threads=None)
+    spread_light = starburst_layer(pattern, N, *frame, threads=None)
+    clean = starburst_layer(replace(pattern, veil=()), N, *frame, threads=None)
     columns = np.floor(cx + place * math.cos(direction) / pitch).astype(int)
     rows = np.floor(high - 10.0 - place * math.sin(direction) / pitch).astype(int)
     found = (spread_light - clean)[rows, columns, 0]

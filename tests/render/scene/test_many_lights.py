@@ -144,7 +144,7 @@ def test_stars_laid_together_are_stars_drawn_one_by_one(iris):
     together = draw_stars(stars, pixel, size, draft=False, threads=2)
     alone = np.zeros((size[1], size[0], 3))
     for (x, y), gain in zip(centres, gains, strict=True):
-        alone += starburst_layer(iris, 8.0, pixel, size, (x, y), wave, weights * gain, pattern=pattern)
+        alone += starburst_layer(pattern, 8.0, pixel, size, (x, y), wave, weights * gain)
     # the picture's border halves a peak
     assert together.sum(axis=(0, 1)) == pytest.approx(alone.sum(axis=(0, 1)), rel=5e-4)
     off = np.abs(together - alone) / alone
@@ -174,7 +174,7 @@ def test_whatever_shapes_the_iris_its_stars_are_laid_together(iris, mask, soil):
     gains = np.array([[1.0, 1.0, 1.0], [0.5, 0.7, 0.9], [3.0, 3.0, 3.0], [0.1, 0.1, 0.1], [2.0, 1.0, 1.0]])
     alone = np.zeros((size[1], size[0], 3))
     for (x, y), gain in zip(centres, gains, strict=True):
-        alone += starburst_layer(iris, 8.0, pixel, size, (x, y), wave, weights * gain, pattern=pattern)
+        alone += starburst_layer(pattern, 8.0, pixel, size, (x, y), wave, weights * gain)
     far = np.ones(size[::-1], dtype=bool)
     y, x = np.indices(far.shape) + 0.5
     for column, row in centres:

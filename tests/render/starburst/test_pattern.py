@@ -33,8 +33,7 @@ SHAPES = [
 
 def layer(iris, f_number=16.0, pitch=0.028, size=(200, 160), centre=None, wave=WHITE_NM, weights=WHITE, mask=None):
     centre = centre or (size[0] / 2 + 0.3, size[1] / 2 - 0.2)
-    pattern = pupil_pattern(iris) if mask is None else None
-    return starburst_layer(iris, f_number, (pitch, pitch), size, centre, wave, weights, mask=mask, pattern=pattern)
+    return starburst_layer(pupil_pattern(iris, mask), f_number, (pitch, pitch), size, centre, wave, weights)
 
 
 def some(fast, others):
@@ -210,9 +209,7 @@ def test_spike_profile_is_averaged_over_the_pixel(pitch, N, lines):
 def test_a_draft_errs_near_the_centre_only(f_number, iris):
     size, centre = (320, 180), (160.3, 89.8)
     final = layer(iris, f_number, size=size, centre=centre, weights=GREY)
-    draft = starburst_layer(
-        iris, f_number, (0.028, 0.028), size, centre, WHITE_NM, GREY, pattern=pupil_pattern(iris), split=1
-    )
+    draft = starburst_layer(pupil_pattern(iris), f_number, (0.028, 0.028), size, centre, WHITE_NM, GREY, split=1)
     assert np.abs(draft - final).max() < 5e-6 * final.max()
     assert draft.sum(dtype=float) == pytest.approx(final.sum(dtype=float), rel=3e-5)
     far = radii(size, centre, 1.0) > 12.0
@@ -384,6 +381,6 @@ def test_no_flux_is_lost_where_the_core_is_smaller_than_a_pixel(mode, lights):
 def test_threads_change_nothing(iris):
     size, centre = (90, 2 * BAND + 7), (40.3, 70.8)
     alone, together = (
-        starburst_layer(iris, 8.0, (0.02, 0.02), size, centre, WHITE_NM, GREY, threads=n) for n in (1, 3)
+        starburst_layer(pupil_pattern(iris), 8.0, (0.02, 0.02), size, centre, WHITE_NM, GREY, threads=n) for n in (1, 3)
     )
     assert alone.tobytes() == together.tobytes()

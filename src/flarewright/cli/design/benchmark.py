@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ...errors import ProjectError
-from ..common import check_place, console, print_json, print_remark, status_line, stop_on_interrupt, write_text
+from ..common import check_place, console, print_json, print_remark, search_status, stop_on_interrupt, write_text
 from ..option_record import with_options
 from ..partial_work import partial_work
 from ..shared_options import Json
@@ -167,7 +167,7 @@ def _run_all(trial: Trial, options: BenchmarkOptions, limits: Limits, measure: A
     with (
         stop_on_interrupt() as asked,
         partial_work(place, inputs, "run", "runs") as steps,
-        status_line("searching") as progress,
+        search_status() as progress,
     ):
         run_one = partial(_run_one(trial), trial, measure=measure, threads=options.threads)
         done: list[Done] = []

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ...errors import OutputError, ProjectError
-from ..common import print_json, print_remark, print_remarks, status_line, stop_on_interrupt
+from ..common import print_json, print_remark, print_remarks, search_status, stop_on_interrupt
 from ..shared_options import Json
 from .checks import check_fitness, check_time
 from .options import Cluster, Fitness, Lenses, Output, Processes, Restarts, Searches, Seed, Solver, Threads, Time
@@ -193,7 +193,7 @@ def _listed(breaks: Sequence[Breach], joint: str) -> str:
 @contextmanager
 def _progress_display(unit: str) -> Iterator[Callable[[PoolState], None] | None]:
     """Show the best result so far on a terminal."""
-    with status_line("searching") as update:
+    with search_status() as update:
 
         def show(state: PoolState) -> None:
             best = "-" if state.best is None else f"{state.best.cost:.3g}"

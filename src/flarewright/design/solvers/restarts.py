@@ -19,10 +19,6 @@ def restart_seed(seed: int, number: int) -> int:
     number : int
         From 0; the first one is the search without restarts.
 
-    Returns
-    -------
-    int
-
     Examples
     --------
     >>> restart_seed(7, 0), restart_seed(7, 1) != restart_seed(7, 2)

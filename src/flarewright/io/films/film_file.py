@@ -94,10 +94,6 @@ def open_film(path: str | os.PathLike[str]) -> Film:
     ----------
     path : path
 
-    Returns
-    -------
-    Film
-
     Raises
     ------
     FileError

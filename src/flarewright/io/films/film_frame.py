@@ -40,10 +40,6 @@ def read_film_frame(path: str | os.PathLike[str], index: int, *, transfer: Trans
     transfer : str, optional
         What the codes mean (`io.images.transfer`); None: what the film states, or else a video camera.
 
-    Returns
-    -------
-    PlatePicture
-
     Raises
     ------
     FileError

@@ -31,10 +31,6 @@ def murmur3_32(data: bytes, seed: int = 0) -> int:
     seed : int
         0 to 2^32 - 1.
 
-    Returns
-    -------
-    int
-
     Notes
     -----
     A. Appleby, MurmurHash3_x86_32 (smhasher, MurmurHash3.cpp), in the public domain.

@@ -88,10 +88,6 @@ def read_plate(
     transfer : str, optional
         What codes mean (`transfer.decoded`). None: srgb for whole numbers, linear for floating-point numbers.
 
-    Returns
-    -------
-    PlatePicture
-
     Raises
     ------
     FileError

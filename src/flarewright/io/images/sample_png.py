@@ -28,10 +28,6 @@ def encode_samples(samples: NDArray[Any]) -> bytes:
     samples : ndarray, shape (height, width) or (height, width, 3), uint8 or uint16
         Row 0 is the top.
 
-    Returns
-    -------
-    bytes
-
     Raises
     ------
     FlarewrightError

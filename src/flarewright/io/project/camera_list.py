@@ -62,14 +62,6 @@ def is_camera_name(text: str) -> bool:
 def camera_format(name: str) -> CameraFormat:
     """Return a camera by its name; case, spaces and underscores do not matter.
 
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    CameraFormat
-
     Raises
     ------
     ProjectError

@@ -53,10 +53,6 @@ def write_reference_state(path: Path, state: ReferenceState) -> None:
 def read_reference_state(path: str | Path) -> ReferenceState:
     """Read a state file.
 
-    Parameters
-    ----------
-    path : Path
-
     Raises
     ------
     ProjectError

@@ -55,10 +55,6 @@ def read_tracks(
     first_frame : int
         Frame of the first line of a file of `x y` columns, which has no frames.
 
-    Returns
-    -------
-    TrackFile
-
     Raises
     ------
     FileError

@@ -95,10 +95,6 @@ def read_slurm_settings(path: str | os.PathLike[str]) -> SlurmSettings:
     path : path
         A TOML file.
 
-    Returns
-    -------
-    SlurmSettings
-
     Raises
     ------
     ProjectError

@@ -30,7 +30,6 @@ Fitting and search:
 - `strip_means`: `means_along`, means under sliding masks
 - `box_means`: `box_means`, means over squares
 - `cubic_sampling`: `cubic_samples`, cubic convolution
-- `blob_cells`: fine pictures of blobs to pixels: `read_cells`, `gather_cells`, `square_cells`
 - `block_matching`: motion of blocks: `block_misfits`, `block_structure`, `refine_blocks`
 - `motion_smoothness`: agreement of neighbouring blocks: `move_costs`, `agree`
 """

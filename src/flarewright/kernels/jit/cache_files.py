@@ -137,13 +137,7 @@ def report_no_folder() -> None:
 
 
 def report(fault: str, sentence: str) -> None:
-    """Print a sentence to stderr, once for each fault.
-
-    Parameters
-    ----------
-    fault : str
-    sentence : str
-    """
+    """Print a sentence to stderr, once for each fault."""
     if fault in _reported:
         return
     _reported.add(fault)

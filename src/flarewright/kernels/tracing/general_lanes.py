@@ -14,9 +14,7 @@ from .intersect import (
     ASPHERE,
     AXES,
     CENTRED,
-    CONIC_X,
     CONIC_Y,
-    CURVATURE_X,
     CURVATURE_Y,
     DEGREE,
     KIND,
@@ -32,8 +30,12 @@ from .intersect import (
     TANGENT,
     TERMS,
     TORUS,
+    biconic_form,
+    biconic_sag,
     height_of_image,
     intersect_conic,
+    quadric_of,
+    step_to_quadric,
     torus_sag,
 )
 from .refract import ALIVE, LANES, REFLECT, REL, STOP, STOP_X, WEIGHT, X, Y, bend_at, ray_from_near
@@ -171,17 +173,10 @@ def _meet_conic(shapes, row, heading, work):
 @inlined
 def _meet_sag(shapes, row, heading, alive, work):
     """Step to a sag as `kernels.tracing.intersect.intersect_sag` does, for all lanes until those alive converge."""
-    cx, cy = shapes[row, CURVATURE_X], shapes[row, CURVATURE_Y]
-    wx, wy = (1.0 + shapes[row, CONIC_X]) * cx, (1.0 + shapes[row, CONIC_Y]) * cy
-    w = wy if cx == 0.0 else (wx if cy == 0.0 else 0.5 * (wx + wy))
+    quadric = quadric_of(shapes, row)
     for m in range(LANES):
         px, py, pz, ux, uy, uz = work[PX, m], work[PY, m], work[PZ, m], work[UX, m], work[UY, m], work[UZ, m]
-        a = cx * ux * ux + cy * uy * uy + w * uz * uz
-        b = cx * px * ux + cy * py * uy + w * pz * uz - uz
-        c = cx * px * px + cy * py * py + w * pz * pz - 2.0 * pz
-        discriminant = b * b - a * c
-        near = c / (heading * sqrt(max(discriminant, 0.0)) - b)
-        work[T, m] = near if discriminant > 0.0 else -pz / uz
+        work[T, m] = step_to_quadric(quadric, px, py, pz, ux, uy, uz, heading)
     for m in range(LANES):
         work[FIGURE_AT_X, m] = np.inf
     for _ in range(NEWTON_STEPS):
@@ -214,7 +209,11 @@ def _sags(shapes, row, alive, work):
             work[AT_X, m], work[AT_Y, m] = x, y
             work[SAGS, m], work[GX, m], work[GY, m], work[ROOM, m] = torus_sag(shapes, row, x, y)
     else:
-        _biconics(shapes, row, work)
+        form = biconic_form(shapes, row)
+        for m in range(LANES):
+            x, y = work[PX, m] + work[T, m] * work[UX, m], work[PY, m] + work[T, m] * work[UY, m]
+            work[AT_X, m], work[AT_Y, m] = x, y
+            work[SAGS, m], work[GX, m], work[GY, m], work[ROOM, m] = biconic_sag(form, x, y)
     terms = 0
     for k in range(TERMS):
         if shapes[row, ASPHERE + k] != 0.0:
@@ -225,23 +224,6 @@ def _sags(shapes, row, alive, work):
         _aspheres(shapes, row, ODD, int(shapes[row, ODD_COUNT]), True, work)
     if shapes[row, DEGREE] >= 0.0 or shapes[row, SIDE] > 0.0:
         _figures(shapes, row, alive, work)
-
-
-@inlined
-def _biconics(shapes, row, work):
-    """Evaluate the biconic form of all lanes (`kernels.tracing.intersect`)."""
-    cx, cy = shapes[row, CURVATURE_X], shapes[row, CURVATURE_Y]
-    qx, qy = (1.0 + shapes[row, CONIC_X]) * cx * cx, (1.0 + shapes[row, CONIC_Y]) * cy * cy
-    for m in range(LANES):
-        x, y = work[PX, m] + work[T, m] * work[UX, m], work[PY, m] + work[T, m] * work[UY, m]
-        room = 1.0 - qx * x * x - qy * y * y
-        root = sqrt(max(room, 1e-6))
-        whole = cx * x * x + cy * y * y
-        below = 1.0 / (1.0 + root)
-        bend = whole * below * below / root
-        work[ROOM, m], work[SAGS, m] = room, whole * below
-        work[GX, m], work[GY, m] = 2.0 * cx * x * below + bend * qx * x, 2.0 * cy * y * below + bend * qy * y
-        work[AT_X, m], work[AT_Y, m] = x, y
 
 
 @inlined

@@ -181,11 +181,17 @@ def _spline(knot, t):
     return t * t * t / 6.0, 0.5 * t * t
 
 
-@inner
-def _biconic(shapes, row, x, y):
-    """Return the biconic form, its gradient, and its room."""
+@inlined
+def biconic_form(shapes, row):
+    """Return what `biconic_sag` needs of a row: both curvatures and (1 + k) c^2 of both meridians."""
     cx, cy = shapes[row, CURVATURE_X], shapes[row, CURVATURE_Y]
-    qx, qy = (1.0 + shapes[row, CONIC_X]) * cx * cx, (1.0 + shapes[row, CONIC_Y]) * cy * cy
+    return cx, cy, (1.0 + shapes[row, CONIC_X]) * cx * cx, (1.0 + shapes[row, CONIC_Y]) * cy * cy
+
+
+@inlined
+def biconic_sag(form, x, y):
+    """Return the biconic form, its gradient, and its room."""
+    cx, cy, qx, qy = form
     room = 1.0 - qx * x * x - qy * y * y
     root = sqrt(max(room, 1e-6))
     whole = cx * x * x + cy * y * y
@@ -246,7 +252,7 @@ def sag_of_shape(shapes, row, x, y):
     if shapes[row, TORUS] > 0.0:
         sag, slope_x, slope_y, room = torus_sag(shapes, row, x, y)
     else:
-        sag, slope_x, slope_y, room = _biconic(shapes, row, x, y)
+        sag, slope_x, slope_y, room = biconic_sag(biconic_form(shapes, row), x, y)
         value, along_x, along_y = _asphere(shapes, row, ASPHERE, TERMS, False, x, y)
         sag, slope_x, slope_y = sag + value, slope_x + along_x, slope_y + along_y
     if shapes[row, ODD_COUNT] > 0.0:
@@ -259,6 +265,27 @@ def sag_of_shape(shapes, row, x, y):
         value, along_x, along_y = height_of_image(shapes, row, x, y)
         sag, slope_x, slope_y = sag + value, slope_x + along_x, slope_y + along_y
     return sag, slope_x, slope_y, room
+
+
+@inlined
+def quadric_of(shapes, row):
+    """Return the curvatures of the osculating quadric cx x^2 + cy y^2 + w z^2 = 2 z of a row."""
+    cx, cy = shapes[row, CURVATURE_X], shapes[row, CURVATURE_Y]
+    wx, wy = (1.0 + shapes[row, CONIC_X]) * cx, (1.0 + shapes[row, CONIC_Y]) * cy
+    w = wy if cx == 0.0 else (wx if cy == 0.0 else 0.5 * (wx + wy))
+    return cx, cy, w
+
+
+@inlined
+def step_to_quadric(quadric, x, y, z, dx, dy, dz, heading):
+    """Return the step from a point to a quadric, or to the plane of the vertex if the ray misses the quadric."""
+    cx, cy, w = quadric
+    a = cx * dx * dx + cy * dy * dy + w * dz * dz
+    b = cx * x * dx + cy * y * dy + w * z * dz - dz
+    c = cx * x * x + cy * y * y + w * z * z - 2.0 * z
+    discriminant = b * b - a * c
+    near = c / (heading * sqrt(max(discriminant, 0.0)) - b)
+    return near if discriminant > 0.0 else -z / dz
 
 
 @inner
@@ -283,20 +310,10 @@ def intersect_sag(shapes, row, x, y, z, dx, dy, dz, heading):
 
     Notes
     -----
-    Newton's method on F(t) = sag(x + t dx, y + t dy) - z - t dz (Spencer and Murty 1962). The start is the closed-form
-    hit of the osculating quadric cx x^2 + cy y^2 + w z^2 = 2 z, or the plane of the vertex if the ray misses the
-    quadric.
+    Newton's method on F(t) = sag(x + t dx, y + t dy) - z - t dz (Spencer and Murty 1962). The start is the hit of
+    `step_to_quadric`.
     """
-    cx, cy = shapes[row, CURVATURE_X], shapes[row, CURVATURE_Y]
-    wx, wy = (1.0 + shapes[row, CONIC_X]) * cx, (1.0 + shapes[row, CONIC_Y]) * cy
-    w = wy if cx == 0.0 else (wx if cy == 0.0 else 0.5 * (wx + wy))
-    a = cx * dx * dx + cy * dy * dy + w * dz * dz
-    b = cx * x * dx + cy * y * dy + w * z * dz - dz
-    c = cx * x * x + cy * y * y + w * z * z - 2.0 * z
-    discriminant = b * b - a * c
-    t = -z / dz
-    if discriminant > 0.0:
-        t = c / (heading * sqrt(discriminant) - b)
+    t = step_to_quadric(quadric_of(shapes, row), x, y, z, dx, dy, dz, heading)
     sag, slope_x, slope_y, room = 0.0, 0.0, 0.0, 0.0
     error = 1.0
     for _ in range(NEWTON_STEPS):

@@ -41,9 +41,7 @@ class Shape:
     discs: int = 0
 
 
-def free_numbers(
-    order: int, discs: int, intensity_order: int, soft: bool = False, lateral: bool = False, below: bool = False
-) -> Indices:
+def free_numbers(order: int, discs: int, intensity_order: int, soft: bool = False, below: bool = False) -> Indices:
     """Return the indices of the parameters to fit.
 
     Parameters
@@ -55,8 +53,6 @@ def free_numbers(
         0: uniform; 1: first order in u, v, w; 2: all terms.
     soft : bool
         Include the softness of the borders.
-    lateral : bool
-        Include lateral colour: the spread of the channel's wavelengths, its asymmetry and its growth with the field.
     below : bool
         Include the denominator of position and size.
     """
@@ -65,7 +61,6 @@ def free_numbers(
     picked = [*geometry, *(FIRST_G + k for k in geometry), *(FIRST_I + k for k in light)]
     picked += [FIRST_DISC + k for k in range(DISC_NUMBERS * discs)]
     picked += [SOFT] if soft else []
-    picked += range(LATERAL, BELOW) if lateral else []
     picked += range(BELOW, BELOW + BELOW_NUMBERS) if below else []
     return np.array(picked, dtype=np.int64)
 

@@ -19,7 +19,7 @@ from .settings import CrescentSettings, DetectionSettings, RimSettings
 
 
 def crescents(
-    slopes: Slopes, width: int, *, most: int = 8, pool: ThreadPoolExecutor | None = None,
+    slopes: Slopes, width: int, pool: ThreadPoolExecutor | None = None,
     settings: DetectionSettings = DetectionSettings(),
 ) -> list[RimCandidate]:  # fmt: skip
     """Return the best candidates, best first, without candidates close to a better one.
@@ -29,8 +29,6 @@ def crescents(
     slopes : Slopes
     width : int
         Width of the full picture, pixels.
-    most : int
-        Maximum number of candidates.
     pool : executor, optional
     settings : DetectionSettings
     """
@@ -40,7 +38,7 @@ def crescents(
     ]  # fmt: skip
     best: list[RimCandidate] = []
     for candidate in sorted(found, key=lambda each: -each.score):
-        if len(best) == most:
+        if len(best) == settings.crescents.most:
             break
         if not any(_same(candidate, other, slopes.sigmas, settings.crescents) for other in best):
             best.append(candidate)

@@ -52,8 +52,7 @@ def join_ghosts(
     A lens of revolution maps the pupil by g(u), u the square of the distance from its centre
     (`kernels.ghost_model.pupil_mesh`). Small g near the centre makes a bright core; a fit that starts from a uniform
     disc does not reach it.
-    Blobs are not joined: a larger ghost cannot draw a caustic of one or two pixels that is many times brighter. The
-    residual learns it at subpixel resolution, attached to a separate ghost (`blob_sprites`).
+    Blobs are not joined: a larger ghost cannot draw a caustic of one or two pixels that is many times brighter.
     """
     out = list(ghosts)
     rest = residual_of(out, views, 1, pool)

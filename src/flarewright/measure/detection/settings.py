@@ -60,6 +60,7 @@ class CrescentSettings:
     compared: int = 400  # number of best candidates of each search that are compared
     most_distance: float = 0.3  # maximum distance of equal candidates, over their mean size in their middle view
     most_size_difference: float = 0.4  # maximum difference of the size of equal candidates, over the larger size
+    most: int = 8  # maximum number of candidates
 
 
 @dataclass(frozen=True)
@@ -140,6 +141,7 @@ class SplitSettings:
 class PictureSettings:
     """Ghosts of one picture, see `single_image.spots_of_picture`."""
 
+    most: int = 60  # maximum number of ghosts
     enough: float = 0.25  # minimum score of a proposed circle, over the best possible score
     above_chance: float = 1.25  # minimum score of a proposed circle, over the score of chance
     border: float = 0.06  # half width of the band around a found border that later votes exclude, over the radius

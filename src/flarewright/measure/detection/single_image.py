@@ -47,7 +47,7 @@ class Spot:
 
 
 def spots_of_picture(
-    pixels: Pixels, axis_px: tuple[float, float], toward_deg: float, *, most: int = 20, hidden: Mask | None = None,
+    pixels: Pixels, axis_px: tuple[float, float], toward_deg: float, *, hidden: Mask | None = None,
     settings: DetectionSettings = DetectionSettings(),
 ) -> tuple[Spot, ...]:  # fmt: skip
     """Find the ghosts of one picture.
@@ -60,8 +60,6 @@ def spots_of_picture(
         Position of the optical axis.
     toward_deg : float
         Direction of the light, counterclockwise from the right in the upright picture.
-    most : int
-        Maximum number of ghosts.
     hidden : ndarray of bool, shape (H, W), optional
         Pixels to ignore.
     settings : DetectionSettings
@@ -92,7 +90,7 @@ def spots_of_picture(
     )
     enough = max(settings.picture.enough, settings.picture.above_chance * chance)
     found: list[Spot] = []
-    while len(found) < most:
+    while len(found) < settings.picture.most:
         best = candidates(slopes, width, most=1, settings=settings.rims)
         if not best or best[0].score < enough:
             break

@@ -13,7 +13,7 @@ The public entry points are `replay_model` and, for projects, `render_any`.
 - `ghost_arrays`: `pack` converts ghosts to the arrays of the kernels
 - `residual`: `draw_residual` draws the sprites of a model
 - `sprites`: `draw_sprites`, and the interpolation between a sprite's images
-- `blob_drawing`: sprites that follow one small, bright ghost
+- `blob_drawing`: sprites of earlier versions that follow one small, bright ghost
 - `motion_warp`: moves the residual along its measured motion
 - `fine_detail`: detail finer than a sprite's cells
 - `clamping`: limits a replay to the range of the adjacent photographs

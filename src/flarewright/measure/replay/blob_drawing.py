@@ -1,4 +1,6 @@
-"""Draw the residual at blobs: images with subpixel cells that move and scale with one small ghost.
+"""Draw the residual at blobs in models that earlier versions wrote (ADR 0040).
+
+It consists of images with subpixel cells that move and scale with one small ghost.
 
 An image of the light source a few pixels wide can be a thousand times as bright as its surroundings. An error of a
 tenth of its brightness exceeds all other errors in a picture, and cells of several pixels cannot represent it.
@@ -39,16 +41,10 @@ class Outline:
         Centroid of the lit area, measured from the axis towards the light.
     spread : tuple of float
         Standard deviation of the lit area, along the light's direction and across it.
-    half : tuple of float
-        Half the sides of the bounding box.
-    peak : float
-        Largest radiance.
     """
 
     along: float
     spread: tuple[float, float]
-    half: tuple[float, float]
-    peak: float
 
     def place(self, frame: Floats) -> tuple[float, float]:
         """Return the position of the centroid in a picture, pixels; `frame` is from `parameter_vector.frame`."""
@@ -102,9 +98,7 @@ class Reading:
     weights: Floats
 
 
-def blob_outline(
-    packed: Packed, model: GhostModel, name: str, constellation_deg: float, largest_px: float = float(_FAR)
-) -> Outline | None:
+def blob_outline(packed: Packed, model: GhostModel, name: str, constellation_deg: float) -> Outline | None:
     """Compute the lit area of a ghost, also beyond the picture; None if it is vignetted, too large or missing.
 
     Parameters
@@ -114,8 +108,6 @@ def blob_outline(
     model : GhostModel
     name : str
     constellation_deg : float
-    largest_px : float
-        Half the longer side of the largest box to accept.
     """
     meshes, numbers, counts, _ = packed
     k = next((k for k, ghost in enumerate(meshes) if ghost.name == name), None)
@@ -126,7 +118,7 @@ def blob_outline(
     green = posed_numbers(meshes[one], numbers[:, one], constellation_deg, sigma)[1]
     frame = np.array([_FAR, _FAR, 1.0, 0.0, 1.0])
     left, top, width, height = window_of(green[0], counts[1, k], sigma, frame, 2 * _FAR, 2 * _FAR)
-    if not 0 < min(width, height) <= max(width, height) <= 2.0 * min(largest_px, 0.5 * _FAR):
+    if not 0 < min(width, height) <= max(width, height) <= _FAR:
         return None
     left, top = left - _FAR - _MARGIN, top - _FAR - _MARGIN
     finer = min(_FINER, _SAMPLES / max(width, height))
@@ -143,7 +135,7 @@ def blob_outline(
         places = start + (np.arange(counted.size) + 0.5) / finer
         middles.append(float(counted @ places / counted.sum()))
         spreads.append(float(np.sqrt(counted @ (places - middles[-1]) ** 2 / counted.sum())))
-    return Outline(middles[0], (spreads[0], spreads[1]), (0.5 * width, 0.5 * height), peak)
+    return Outline(middles[0], (spreads[0], spreads[1]))
 
 
 def reading(grid: Grid, at: Outline, frame: Floats, size_px: tuple[int, int]) -> Reading:

@@ -11,16 +11,13 @@ from functools import partial
 import numpy as np
 
 from ...model.measurement.ghost_model import GhostModel
-from ...typing import Pixels
+from ...typing import Mask, Pixels
 from ..core.checkpoint import Journal
 from ..core.parallel import map_batched
 from ..core.views import View
-from ..glow.subtraction import AROUND_LIGHT, light_around, masks_of, off_light
-from ..replay.blob_drawing import draw_blobs
-from ..replay.ghost_arrays import pack
+from ..glow.subtraction import AROUND_LIGHT, light_around, off_light
 from ..replay.light_law import light_of_view
 from ..replay.model_image import draw
-from .blob_sprites import all_hidden, blob_sprites, blobs_of, covered_cells
 from .clamp_range import with_reaches
 from .fine_detail_fit import with_detail
 from .motion_fit import with_moves
@@ -49,30 +46,30 @@ def with_residual(
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         placed = [replace(view, light_px=light_of_view(model, view)) for view in views]
         left = map_batched(partial(_left_by, model), placed, pool=pool)
-        blobs = blobs_of(model, placed)
-        # mask blobs: they are so bright that coarse cells would spread their errors over the surroundings
-        masks = covered_cells(blobs, placed, left)
-        spikes = steps.step(lambda: spike_sprites(placed, all_hidden(left, masks, pool), model.star))
+        spikes = steps.step(lambda: spike_sprites(placed, left, model.star))
         left = beside_sprites(left, spikes, placed, pool)
         # coarse images overshoot beside the light's image; finer ones correct that only where values are known
-        around = map_batched(around_light, placed, all_hidden(left, masks, pool), pool=pool)
+        around = map_batched(around_light, placed, left, pool=pool)
         going = steps.step(lambda: light_sprites(placed, around, model.star is not None, pool))
         left = beside_sprites(left, going, placed, pool)
         # next to the light a pixel's error exceeds everything that turns about the axis
         next_to_light = [off_light(view) < NEXT_TO_LIGHT * view.size_px[0] for view in placed]
-        axis = steps.step(
-            lambda: axis_sprite(placed, all_hidden(all_hidden(left, masks, pool), next_to_light, pool), pool)
-        )
+        axis = steps.step(lambda: axis_sprite(placed, all_hidden(left, next_to_light, pool), pool))
         left = beside_sprites(left, (axis,), placed, pool)
-        small = steps.step(lambda: blob_sprites(blobs, placed, left, masks_of(placed)))
-    still = model.replace(sprites=(*spikes, *going, axis, *small))
+    still = model.replace(sprites=(*spikes, *going, axis))
     moving = still.replace(sprites=steps.step(lambda: with_moves(still, threads).sprites))
-    packed = pack(moving)
-    left = [
-        each - draw_blobs(small, packed, moving, view.constellation_deg, view.frame, view.size_px)
-        for each, view in zip(left, placed, strict=True)
-    ]
     return with_reaches(with_detail(moving, placed, all_hidden(left, next_to_light), threads), placed, threads)
+
+
+def all_hidden(
+    pictures: Sequence[Pixels], masks: Sequence[Mask], pool: ThreadPoolExecutor | None = None
+) -> list[Pixels]:
+    """Return images with NaN inside their masks."""
+
+    def hidden(pixels: Pixels, mask: Mask) -> Pixels:
+        return np.where(mask[..., None], np.float32(np.nan), pixels)
+
+    return map_batched(hidden, pictures, masks, pool=pool)
 
 
 def _left_by(model: GhostModel, view: View) -> Pixels:

@@ -78,9 +78,8 @@ class _Drawn:
 
 
 def measure_together(
-    ghosts: Sequence[Shapes], expected: Sequence[Pose], view: View, *, steps: int = 6, sure: bool = True,
-    settings: FrameFitSettings = FrameFitSettings(),
-) -> Measured:  # fmt: skip
+    ghosts: Sequence[Shapes], expected: Sequence[Pose], view: View, settings: FrameFitSettings = FrameFitSettings()
+) -> Measured:
     """Fit brightness, shift and size of every ghost in one view, all at once.
 
     Parameters
@@ -91,10 +90,6 @@ def measure_together(
         Predicted poses; the fit stays near them.
     view : View
         With halo and star subtracted.
-    steps : int
-        Maximum number of Gauss-Newton steps, first with full weight of outliers and then with reduced weight.
-    sure : bool
-        Count the expected model error as noise, and reduce the weight of outliers.
     settings : FrameFitSettings
 
     Notes
@@ -112,9 +107,9 @@ def measure_together(
     prior[size:] = 1.0 / _background_spread(view, settings) ** 2
     # a ghost far from its prediction looks like an outlier: reduce the weight of outliers only in the second pass
     drawn = _draw_colours(ghosts, poses, view)
-    for robust in (False, True) if sure else (False,):
-        matrix, side, cost, count = _normal_equations(drawn, view, size, sure, robust, settings)
-        for _ in range(steps):
+    for robust in (False, True):
+        matrix, side, cost, count = _normal_equations(drawn, view, size, robust, settings)
+        for _ in range(settings.steps):
             off = np.array([_difference(e, p) for e, p in zip(expected, poses, strict=True)]).reshape(-1, PER_GHOST)
             pulled = side.copy()
             pulled[:size] += prior[:size] * off.ravel()
@@ -128,7 +123,7 @@ def measure_together(
                 poses = trial
                 break
             redrawn = _draw_colours(ghosts, trial, view)
-            there = _normal_equations(redrawn, view, size, sure, robust, settings)
+            there = _normal_equations(redrawn, view, size, robust, settings)
             if there[2] > cost:
                 break
             enough = there[2] > (1.0 - settings.least_gain) * cost
@@ -176,7 +171,7 @@ def _stepped(pose: Pose, step: Floats, limit: Floats, sizes: tuple[float, float]
 
 
 def _normal_equations(
-    drawn: Sequence[_Drawn], view: View, size: int, sure: bool, robust: bool, settings: FrameFitSettings
+    drawn: Sequence[_Drawn], view: View, size: int, robust: bool, settings: FrameFitSettings
 ) -> tuple[Floats, Floats, float, int]:
     """Return normal matrix, right-hand side, cost and number of weighted pixel values of a view.
 
@@ -185,7 +180,7 @@ def _normal_equations(
     matrix, side = np.zeros((size + CHANNELS, size + CHANNELS)), np.zeros(size + CHANNELS)
     total, count = 0.0, 0
     for m, colour in enumerate(drawn):
-        weight = _weights(view.pixels[..., m], view.variance[..., m].astype(np.float64), colour.picture, sure, settings)
+        weight = _weights(view.pixels[..., m], view.variance[..., m].astype(np.float64), colour.picture, settings)
         # the residual includes the uniform background, which each step solves again
         left = np.where(weight > 0.0, view.pixels[..., m] - colour.picture, 0.0)
         if robust:
@@ -196,9 +191,9 @@ def _normal_equations(
     return matrix, side, total, count
 
 
-def _weights(pixels: Pixels, variance: Floats, picture: Floats, sure: bool, settings: FrameFitSettings) -> Floats:
+def _weights(pixels: Pixels, variance: Floats, picture: Floats, settings: FrameFitSettings) -> Floats:
     known = np.isfinite(variance)
-    error = settings.model_error * np.maximum(np.abs(picture), np.abs(pixels)) if sure else 0.0
+    error = settings.model_error * np.maximum(np.abs(picture), np.abs(pixels))
     return np.asarray(np.where(known, 1.0 / (np.where(known, variance, 1.0) + error**2), 0.0))
 
 

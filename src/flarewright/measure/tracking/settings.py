@@ -12,6 +12,7 @@ class FrameFitSettings:
     """Joint fit of all ghosts in one frame, see `frame_fit.measure_together`."""
 
     width_px: int = 240  # maximum width of the halved pictures, pixels: three parameters per ghost need no more
+    steps: int = 6  # maximum number of Gauss-Newton steps, with full and then with reduced weight of outliers
     brightness_spread: float = 3.0  # prior spread of a brightness about the prediction, over the model
     shift_spread: float = 0.3  # prior spread of a shift about the prediction, over the ghost's radius
     shift_spread_width: float = 0.01  # added prior spread of a shift, over the picture's width

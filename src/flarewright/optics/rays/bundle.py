@@ -82,10 +82,6 @@ def incidence(field_deg: tuple[float, float], distance: float | None = None, pup
     pupil_z : float
         Entrance pupil, mm from the first vertex; used only for a near light.
 
-    Returns
-    -------
-    Incidence
-
     Raises
     ------
     ValueError
@@ -108,10 +104,6 @@ def incidence(field_deg: tuple[float, float], distance: float | None = None, pup
 
 def least_distance(packed: PackedLens) -> float:
     """Return the least distance of a light in front of the first vertex at which it is outside the lens, mm.
-
-    Parameters
-    ----------
-    packed : PackedLens
 
     Returns
     -------
@@ -204,10 +196,6 @@ def trace_grid(
         From `find_region`.
     fine : Refinement
 
-    Returns
-    -------
-    Bundle
-
     Notes
     -----
     The pre-pass may lose the narrow end of an arc. The grid is finer than its samples: where a node on a side of the
@@ -265,13 +253,6 @@ def _lit_sides(
 
 def trace_bundle(packed: PackedLens, w: int, bundle: Bundle, tilt: float) -> Floats:
     """Return a bundle's nodes at one wavelength; traces them unless the grid already has them.
-
-    Parameters
-    ----------
-    packed : PackedLens
-    w : int
-    bundle : Bundle
-    tilt : float
 
     Returns
     -------

@@ -159,10 +159,6 @@ def pack_for_query(lens: Lens, order: FirstOrder, coating: CoatingChoice, query:
         At the opening and focus to be used.
     coating : CoatingChoice
     query : GhostQuery
-
-    Returns
-    -------
-    PackedLens
     """
     coatings = resolve_coatings(lens, coating)
     return pack_lens(lens, order, coatings, np.array([query.wavelength_nm]), sensor=query.sensor)
@@ -195,10 +191,6 @@ def ghost_table(
     measured : dict of str to GhostRow, optional
         Finished rows of an interrupted call with the same arguments, by name, their peaks per unit of light; the
         finished rows of this one are put in.
-
-    Returns
-    -------
-    GhostTable
 
     Notes
     -----

@@ -237,10 +237,6 @@ def pack_lens(
         Replaces `PackedLens.reflectance`: means over the bands of the wavelengths
         (`optics.rays.path_reflectance.BandCurves.tables`).
 
-    Returns
-    -------
-    PackedLens
-
     Raises
     ------
     LensError
@@ -310,10 +306,6 @@ def facing(packed: PackedLens, axes: Floats, nearness: float = 0.0) -> PackedLen
         Those of the light (`optics.rays.bundle.Incidence.axes`).
     nearness : float
         That of the light.
-
-    Returns
-    -------
-    PackedLens
     """
     if packed.symmetric or packed.shapes is None:
         return packed if packed.nearness == nearness else replace(packed, nearness=nearness)

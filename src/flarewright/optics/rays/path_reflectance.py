@@ -185,10 +185,6 @@ def band_curves(curves: CoatingCurves, spectrum: Spectrum, wavelengths_nm: tuple
     wavelengths_nm : tuple of float
         Ascending.
 
-    Returns
-    -------
-    BandCurves
-
     Notes
     -----
     A film can make a path dark at one wavelength and bright next to it. Rays with the band's means carry light wherever

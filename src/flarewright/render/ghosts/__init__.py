@@ -1,11 +1,14 @@
 """The ghost pass, in draft quality (paraxial matrices) and final quality (traced ray bundles).
 
-`ghost_pass` distributes paths over threads, calls the drawing code of either quality for each path and light, and adds
-the pictures in a fixed order.
+`ghost_pass` calls `draft_ghosts` or `final_ghosts`, which distribute paths over threads, call the drawing code for each
+path and light, and add the pictures in a fixed order.
 
 Modules:
 
-- `ghost_pass`: `render_ghosts`, `GhostPass`, `plain_level`: the entry points
+- `ghost_pass`: `render_ghosts`: the entry point
+- `draft_ghosts`: `draw_drafts`: all ghosts of a picture in draft quality
+- `final_ghosts`: `draw_finals`, `plain_level`: all ghosts of a picture in final quality
+- `ghost_sums`: `GhostWork`, `GhostPass`, `sum_ghosts`: what both share; pictures are added in a fixed order
 - `final_pass`: `FinalPass`, one path of one light, ready to be drawn
 - `pupil_search`: `ghost_search`: search the accepted pupil of every path and light
 - `traced_ghosts`: `find_final`, `draw_final`, `draw_alone`: ghosts in final quality

@@ -56,10 +56,6 @@ def surroundings(
         At least one. All other ghosts count as dark.
     run : callable
         Maps a function over the ghosts, possibly in several threads, and yields the results in order.
-
-    Returns
-    -------
-    Surroundings
     """
     width, height = _size(items[0].shot.size_px)
     total = np.zeros((height, width))
@@ -72,10 +68,6 @@ def surroundings(
 
 def sketch(item: FinalPass) -> Pixels:
     """Draw a ghost at 1/16 of the resolution.
-
-    Parameters
-    ----------
-    item : FinalPass
 
     Returns
     -------

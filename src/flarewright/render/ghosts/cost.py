@@ -197,10 +197,6 @@ def covered_px(
     size_px : tuple of int
     mirror : float
         1: the bundle; -1: its mirror image.
-
-    Returns
-    -------
-    float
     """
     alive = (data[bundle.triangles, ALIVE] > 0.0).all(axis=1)
     x, y = mirror * data[bundle.triangles[alive], X], data[bundle.triangles[alive], Y]

@@ -269,10 +269,6 @@ def ringing_for(mode: Literal["collins", "frft"], opening: Opening, radius: floa
     ----------
     mode, opening, radius, f_number
         As in `Ringing`.
-
-    Returns
-    -------
-    Ringing
     """
     with _LAST.lock:
         last = _LAST.held

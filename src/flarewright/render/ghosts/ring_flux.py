@@ -103,10 +103,6 @@ def ring_flux(
     carried : ndarray, shape (W,), optional
         Mean weight of the rays at the traced wavelengths (`optics.rays.path_reflectance.PathSpectrum`); None: equal.
 
-    Returns
-    -------
-    RingFlux
-
     Notes
     -----
     `tests/render/ghosts/test_diffraction_rings.py` compares sums of layers with and without rings.

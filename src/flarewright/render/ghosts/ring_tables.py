@@ -182,10 +182,6 @@ def picture_piece(values: Pixels, box: Box) -> Piece:
         0 along the border; the first row is the lowest.
     box : Box
         Position of the picture, mm.
-
-    Returns
-    -------
-    Piece
     """
     found = np.zeros(columns.TABLE_COLUMNS)
     found[columns.ROWS], found[columns.COLUMNS] = values.shape

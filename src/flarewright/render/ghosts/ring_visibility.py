@@ -51,10 +51,6 @@ def ripples_seen(
         Side of the drawn pixels, in pixels of `item`.
     least : float
         Lowest visible ripple relative to the surrounding light.
-
-    Returns
-    -------
-    bool
     """
     height = ripple_height(least_blur(rings.squares_px2, item.source, pixel_px))
     if height < least:
@@ -73,10 +69,6 @@ def least_blur(squares_px2: Floats, source: Floats | None, pixel_px: float = 1.0
         The shape over which an area light spreads each point, pixels.
     pixel_px : float
         Side of the drawn pixels, in pixels of `source`.
-
-    Returns
-    -------
-    float
 
     Notes
     -----

@@ -155,10 +155,6 @@ def edge_contrast(item: FinalPass, level: float) -> float:
     item : FinalPass
     level : float
         Mean irradiance of all ghosts in the picture.
-
-    Returns
-    -------
-    float
     """
     return item.region.brightness * item.gain / item.art.scale**2 / level if level > 0.0 else float("inf")
 

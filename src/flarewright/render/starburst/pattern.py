@@ -11,12 +11,11 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from flarewright.errors import ProjectError
 from flarewright.kernels.diffraction.resample import SpikeTables, blend_blade_wings, blend_fan_wings, deposit_core
-from flarewright.model.lens.iris import Iris
-from flarewright.optics.diffraction.fraunhofer import BladeWings, FanWings, Pattern, pupil_pattern, spike_profile
+from flarewright.optics.diffraction.fraunhofer import BladeWings, FanWings, Pattern, spike_profile
 from flarewright.optics.pupil.dirt import VeilTerm
 
 from ...typing import Floats, Pixels
@@ -41,7 +40,7 @@ _Blend = Callable[[Floats, Pixels | Floats], None]
 
 
 def starburst_layer(
-    iris: Iris,
+    pattern: Pattern,
     f_number: float,
     pixel_mm: tuple[float, float],
     size_px: tuple[int, int],
@@ -49,8 +48,6 @@ def starburst_layer(
     wavelengths_nm: ArrayLike,
     weights_rgb: ArrayLike,
     *,
-    mask: NDArray[np.floating] | None = None,
-    pattern: Pattern | None = None,
     split: int = NEAR_SPLIT,
     threads: int | None = 1,
 ) -> Pixels:
@@ -58,7 +55,8 @@ def starburst_layer(
 
     Parameters
     ----------
-    iris : Iris
+    pattern : Pattern
+        From `optics.diffraction.fraunhofer.pupil_pattern`.
     f_number : float
         Working f-number N. The pattern's scale is x = 2 N lambda s for any focal length.
     pixel_mm : tuple of float
@@ -73,11 +71,6 @@ def starburst_layer(
     weights_rgb : array_like, shape (M, 3)
         Flux of the direct image at each wavelength in each channel (band weight times throughput times intensity);
         negative values are kept.
-    mask : ndarray, shape (rows, columns), or None
-        Image of the iris, as in `optics.pupil.iris.transmission`.
-    pattern : Pattern, optional
-        From `optics.diffraction.fraunhofer.pupil_pattern`, for a pupil with more than an iris; `iris` and `mask` are
-        then ignored.
     split : int
         Least number of parts per side into which pixels near the centre are divided, if the wings begin there; more if
         the core is smaller than a part. 1 is meant for drafts: it takes half the time and keeps the flux to 3e-5. Its
@@ -111,7 +104,6 @@ def starburst_layer(
     strength = np.abs(weights).max(axis=1)
     if not strength.any():
         return picture
-    pattern = pupil_pattern(iris, mask) if pattern is None else pattern
     painter = painter_of(pattern, f_number, pixel_mm, wave, weights)
     # If the blend begins inside the near zone, the pixels there are too coarse for it.
     k = max(split, math.ceil(LEAST_CORE * max(pixel_mm) / painter.inner))

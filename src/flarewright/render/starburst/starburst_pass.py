@@ -208,14 +208,13 @@ def _one_light(
             half_fan = max(pattern.wings.half_fan, 0.5 * smear / SPIRAL_COPIES)
             pattern = replace(pattern, wings=replace(pattern.wings, half_fan=half_fan))
         drawn = starburst_layer(
-            scene.settled.iris,
+            pattern,
             order.f_number * scene.look.size * math.exp(float(turn)),
             pixel,
             size,
             (column + margin[0], row + margin[1]),
             fine_nm,
             shot.weights(fine_nm) * (flux * pattern.transmittance / len(turns))[:, None],
-            pattern=pattern,
             # the centre of a starburst is clipped on screens
             split=1 if quality.mode == "draft" or quality.screen else NEAR_SPLIT,
             threads=threads,

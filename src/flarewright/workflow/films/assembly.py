@@ -103,10 +103,6 @@ def assemble_film(
     report : callable, optional
         Called with the frame, the number of finished frames and that of all.
 
-    Returns
-    -------
-    FilmResult
-
     Raises
     ------
     FlarewrightError

@@ -102,10 +102,6 @@ def add_lenses(
         For `.seq` files that do not state it.
     progress : callable, optional
 
-    Returns
-    -------
-    Addition
-
     Raises
     ------
     FileError

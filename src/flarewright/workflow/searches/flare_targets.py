@@ -92,7 +92,7 @@ def project_of_picture(
         place = axis[0] + focal_mm * x / pixel, axis[1] - focal_mm * y / pixel
         rows, columns = np.indices((high, wide)) + 0.5
         hidden = np.hypot(columns - place[0], rows - place[1]) < _GLOW * wide
-    spots = spots_of_picture(pixels, axis, degrees(atan2(y, x)), most=60, hidden=hidden)
+    spots = spots_of_picture(pixels, axis, degrees(atan2(y, x)), hidden=hidden)
     sensor = (width_mm, width_mm * high / wide)
     ghosts = _striking(spots, pixel, most)
     return seen_project([(light_deg, ghosts)], size_px=(wide, high), sensor_mm=sensor, focal_mm=focal_mm)

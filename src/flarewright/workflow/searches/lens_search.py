@@ -103,10 +103,6 @@ def search_lenses(
     sharing : Sharing, optional
         Who works off the restarts, and where they keep their states.
 
-    Returns
-    -------
-    LensSearch
-
     Raises
     ------
     ProjectError

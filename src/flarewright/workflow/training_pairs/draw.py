@@ -62,10 +62,6 @@ def draw_number(given: AnyDistribution, rng: np.random.Generator) -> float:
     given : Distribution
     rng : numpy.random.Generator
 
-    Returns
-    -------
-    float
-
     Examples
     --------
     >>> import numpy as np

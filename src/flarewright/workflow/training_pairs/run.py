@@ -115,10 +115,6 @@ def dataset(
     announce : callable, optional
         Called with sentences about the cluster as they arise.
 
-    Returns
-    -------
-    DatasetResult
-
     Raises
     ------
     FlarewrightError
