@@ -109,7 +109,8 @@ def find_box(steps, lens, light, crossings, iris_radius, view_radius, box, cells
     axis is searched, where a spot lies that is not one of a pair.
 
     Gaps between neighbouring rays of which one ends, or both at different surfaces, are halved repeatedly: one surface
-    blocks the rays on one side, another surface those on the other side, and both may pass a sliver in between. Close
+    blocks the rays on one side, another surface those on the other side, and both may pass a sliver in between. The
+    halves kept are those whose rays fail differently, as between a ray beyond a rim and one beyond the iris. Close
     to total reflection ray paths change so fast that a narrow ring of rays may pass around the kept region.
     """
     nx, ny = cells
@@ -323,7 +324,11 @@ def _search_cells(steps, lens, light, crossings, iris_radius, corners, hx, hy, a
 
 @inner
 def _search_gaps(steps, lens, light, crossings, iris_radius, samples, few, spots, sums):
-    """Search between grid neighbours that end differently by halving the gap HALVINGS times."""
+    """Search between grid neighbours that end differently by halving the gap HALVINGS times.
+
+    In the halves rays that do not end differ too, if they fail at different limits: light passes between a ray beyond a
+    rim and one beyond the iris.
+    """
     px, py, data, width, hx, hy = samples
     # surfaces before the first crossing of the stop
     before = 0
@@ -338,8 +343,9 @@ def _search_gaps(steps, lens, light, crossings, iris_radius, samples, few, spots
                 continue
             if not _is_doubtful_gap(data, k, other, before, crossings, iris_radius, few):
                 continue
-            gaps[n_gaps, 0], gaps[n_gaps, 1], gaps[n_gaps, 2] = px[k], py[k], _end(data, k)
-            gaps[n_gaps, 3], gaps[n_gaps, 4], gaps[n_gaps, 5] = px[other], py[other], _end(data, other)
+            end, its_end = _failure(data, k, crossings, iris_radius), _failure(data, other, crossings, iris_radius)
+            gaps[n_gaps, 0], gaps[n_gaps, 1], gaps[n_gaps, 2] = px[k], py[k], end
+            gaps[n_gaps, 3], gaps[n_gaps, 4], gaps[n_gaps, 5] = px[other], py[other], its_end
             n_gaps += 1
     share = hx * hy * np.cos(light.tilt)
     for _ in range(HALVINGS):
@@ -355,9 +361,9 @@ def _search_gaps(steps, lens, light, crossings, iris_radius, samples, few, spots
             if passes(middle, k, crossings, iris_radius):
                 _add_spot(spots, sums, middle, k, mx[k], my[k], hx / PROBES, hy / PROBES, share)
                 continue
-            end = _end(middle, k)
+            end = _failure(middle, k, crossings, iris_radius)
             for side in range(2):
-                # keep the half whose rays still end differently
+                # keep the half whose rays still fail differently
                 if end != gaps[k, 3 * side + 2]:
                     for m in range(3):
                         narrower[count, m] = gaps[k, 3 * side + m]
@@ -371,6 +377,20 @@ def _search_gaps(steps, lens, light, crossings, iris_radius, samples, few, spots
 def _end(data, k):
     """Return the number of surfaces that a ray passed before it ended, -1 for a ray that did not end."""
     return -1.0 if data[k, ALIVE] > 0.0 else data[k, X]
+
+
+@borrowing
+def _failure(data, k, crossings, iris_radius):
+    """Return the number of surfaces that a ray passed before it ended; -1: beyond a rim, -2: the iris, -3: both."""
+    if data[k, ALIVE] == 0.0:
+        return data[k, X]
+    at_iris = False
+    for c in range(crossings):
+        u, v = data[k, STOP_X + 2 * c], data[k, STOP_X + 2 * c + 1]
+        at_iris = at_iris or u * u + v * v > iris_radius * iris_radius
+    if not at_iris:
+        return -1.0
+    return -3.0 if data[k, REL] > RIM else -2.0
 
 
 @borrowing

@@ -29,7 +29,7 @@ RIM_LEVEL = 2
 FLUX_TOLERANCE = 3e-4
 # a region of which less than ARC is lit is widened by WIDER of its size where light comes to its side, at most
 # MOST_WIDENED times
-ARC, WIDER, MOST_WIDENED = 0.25, 0.25, 4
+ARC, WIDER, MOST_WIDENED = 0.25, 0.25, 8
 # limits of a cell's smoothness (`kernels.tracing.grid_limits`)
 INNER_BEND, AREA_RATIO, WEIGHT_BEND, FOLD_PX, AREA_PX = 0.005, 0.5, 0.002, 1.0, 5.0
 
