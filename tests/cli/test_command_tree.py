@@ -1,4 +1,4 @@
-"""A command line imports the modules of its own command, and nothing else."""
+"""A command line imports the modules of one command only."""
 
 import subprocess
 import sys

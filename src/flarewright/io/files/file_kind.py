@@ -1,4 +1,4 @@
-"""Kinds of files, told by suffix and contents, and errors about a file given instead of another kind."""
+"""Kinds of files, by suffix and contents, and errors about a file given instead of another kind."""
 
 from __future__ import annotations
 
