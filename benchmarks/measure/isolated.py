@@ -23,7 +23,7 @@ from benchmarks.measure.lateral_colour import spread_by_colour, with_lateral_sta
 from benchmarks.measure.shoot import setup_of
 from benchmarks.measure.truth import cut_by_frame, footprint, forms_of
 from flarewright.kernels.ghost_model.bezier import BORDER, INNER
-from flarewright.kernels.ghost_model.pupil_mesh import FIRST_DISC, FIRST_I
+from flarewright.kernels.ghost_model.pupil_mesh import BELOW, FIRST_DISC, FIRST_I, LATERAL
 from flarewright.measure.compression.order_selection import can_go
 from flarewright.measure.core.parameter_vector import field, frame, with_bounded_controls
 from flarewright.measure.core.parameters import Shape, free_numbers
@@ -191,7 +191,7 @@ def _fitted(start: Shape, views: list[View]) -> Fit | None:
     if not patches:
         return None
     # the centre of a rim moves linearly with the field
-    free = free_numbers(2, shape.discs, 2, True, True, True)
+    free = np.union1d(free_numbers(2, shape.discs, 2, True, True), np.arange(LATERAL, BELOW))
     free = free[free != FIRST_DISC + 1]
     fit = refine(shape, patches, free, width=width, steps=20, error=0.0)
     while free.size > NUMBERS:

@@ -169,13 +169,13 @@ def test_uneven_and_growing_colour_comes_back_within_its_uncertainty_and_through
     numbers[SOFT], numbers[LATERAL:BELOW] = 0.3, planted
     shown = views((Shape(numbers),), angles=FEWER)
     patches = patches_of(Shape(numbers), shown, 1)
-    free, start = free_numbers(1, 0, 1, True, True), numbers.copy()
+    free, start = np.array([*free_numbers(1, 0, 1, True), *range(LATERAL, BELOW)]), numbers.copy()
     start[LATERAL:BELOW] = 3.0, -0.5, 0.0, 0.0, 0.0, 0.0
     fit = refine(Shape(start), patches, free, width=SIZE[0], steps=60, offset=False, error=0.0)
     assert fit.cost / fit.count == pytest.approx(1.0, abs=0.03)
     assert np.abs((fit.shape.numbers - numbers)[free] / fit.uncertainty[free]).max() < 4.0
     # without these parameters the fit is clearly worse
-    plain = refine(Shape(start), patches, free_numbers(1, 0, 1, True, True)[:-4], width=SIZE[0], steps=60, error=0.0)
+    plain = refine(Shape(start), patches, free[:-4], width=SIZE[0], steps=60, error=0.0)
     assert plain.cost > 1.02 * fit.cost
     written = channel_of(fit.shape.numbers, 0, fit.uncertainty)
     assert len(written.lateral_px) == 6
