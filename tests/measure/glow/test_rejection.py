@@ -7,7 +7,7 @@ import pytest
 from planted_run import SIZE, shape, views
 
 from flarewright.measure.fitting.detected_ghost import DetectedGhost
-from flarewright.measure.glow.rejection import is_residual_glow, with_glow_unwanted
+from flarewright.measure.glow.rejection import is_residual_glow, with_glow_unwanted, without_glow
 from flarewright.measure.glow.subtraction import AROUND_LIGHT
 
 # distance of the light from the axis at field 1, pixels
@@ -78,3 +78,20 @@ def test_ghosts_detected_at_the_light_are_unwanted():
     assert all(now.shapes is before.shapes for now, before in zip(marked, detected, strict=True))
     # a faint one away from the light is judged after its fit
     assert [ghost.unwanted for ghost in marked] == [True, False, False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("ghost", "stays"),
+    [
+        # beside the light, where the residual glow has 1.25 times its light
+        (found(0.85 * WAY, 40.0, 0.04), False),
+        (found(0.85 * WAY, 40.0, 0.06), True),
+        # as faint, far from the residual glow
+        (found(-WAY, 40.0, 0.04), True),
+    ],
+)
+def test_a_ghost_that_residual_glow_outshines_where_it_lies_is_part_of_it(ghost, stays):
+    glow = replace(found(WAY, 60.0, 0.05), unwanted=True)
+    shown = views_with_glow(1.0)
+    assert without_glow([ghost], shown) == [ghost]
+    assert without_glow([glow, ghost], shown) == ([ghost] if stays else [])

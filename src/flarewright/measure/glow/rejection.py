@@ -72,6 +72,54 @@ def with_glow_unwanted(
     return [replace(ghost, unwanted=ghost.unwanted or left) for ghost, left in zip(detected, glow, strict=True)]
 
 
+def without_glow(
+    ghosts: Sequence[DetectedGhost], views: Sequence[View], settings: RejectionSettings = RejectionSettings()
+) -> list[DetectedGhost]:
+    """Return the fitted ghosts that are not residual glow.
+
+    Parameters
+    ----------
+    ghosts : sequence of DetectedGhost
+        Fitted together.
+    views : sequence of View
+        As photographed, in the same pixels.
+    settings : RejectionSettings
+
+    Returns
+    -------
+    list of DetectedGhost
+        Without those that `is_residual_glow` or `with_glow_unwanted` rejects, and without those outshone by them where
+        they lie: a fit determines only the sum of such a ghost and the residual glow.
+    """
+    near = is_residual_glow(ghosts, views, settings)
+    glow = [ghost for ghost, left in zip(ghosts, near, strict=True) if left or ghost.unwanted]
+    masks = masks_of(views)
+    return [
+        ghost
+        for ghost, left in zip(ghosts, near, strict=True)
+        if not (left or ghost.unwanted or _is_outshone(ghost, glow, views, masks, settings))
+    ]
+
+
+def _is_outshone(
+    ghost: DetectedGhost, glow: Sequence[DetectedGhost], views: Sequence[View], masks: Sequence[Mask],
+    settings: RejectionSettings,
+) -> bool:  # fmt: skip
+    """Return whether a ghost has less light than the residual glow at its position."""
+    own, other = 0.0, 0.0
+    for k in evenly_spaced(range(ghost.first, ghost.last + 1), settings.views) if glow else ():
+        for m in range(CHANNELS):
+            part, light = light_of(ghost.shapes[m], views[k])
+            beside = np.zeros(masks[k].shape)
+            for one in glow:
+                where, found = light_of(one.shapes[m], views[k])
+                beside[where] += found
+            there = masks[k][part] & (light > 0.0)
+            own += float(light[there].sum())
+            other += float(beside[part][there].sum())
+    return own < other
+
+
 def _is_glow(
     ghost: DetectedGhost, lead: int, views: Sequence[View], masks: Sequence[Mask], settings: RejectionSettings
 ) -> bool:

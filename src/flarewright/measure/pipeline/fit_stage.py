@@ -28,7 +28,7 @@ from ..detection.split_ghosts import split_ghosts
 from ..fitting.alternating_fit import fit_all, to_model
 from ..fitting.detected_ghost import CHANNELS, DetectedGhost, by_brightness, residual_of
 from ..glow.fit import iris_of
-from ..glow.rejection import is_residual_glow, with_glow_unwanted
+from ..glow.rejection import with_glow_unwanted, without_glow
 from ..glow.subtraction import fit_and_subtract_glow
 from ..residual.learn import with_residual
 from .search_images import mixed_for_search, model_of_run, scaled_ghost, search_views, star_of
@@ -101,11 +101,7 @@ def fit_ghosts(
                 journal=journal, settings=settings.fit,
             )  # fmt: skip
         dim = fit_and_subtract_glow(settled, views, dim.star, pool, settings.glow)
-    wanted = [
-        ghost
-        for ghost, left in zip(settled, is_residual_glow(settled, views, settings.glow.rejection), strict=True)
-        if not (left or ghost.unwanted)
-    ]
+    wanted = without_glow(settled, views, settings.glow.rejection)
     model = model_of_run(run, to_model(wanted, views), dim, views)
     return with_residual(model, views, threads, journal) if residual else model
 
