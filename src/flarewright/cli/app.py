@@ -16,7 +16,7 @@ import typer
 
 from ..errors import FlarewrightError
 from ..kernels.jit.warmup_processes import head_start
-from .command_tree import GROUPS, command_tree
+from .command_tree import BARE_GROUPS, command_tree
 from .common import end_as_interrupted, end_at_once, was_interrupted
 
 # messages of older releases of Typer on option values
@@ -63,7 +63,7 @@ def run(arguments: Sequence[str]) -> int:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     words = list(arguments)
-    if not words or (len(words) == 1 and words[0] in GROUPS and words != ["looks"]):
+    if not words or (len(words) == 1 and words[0] in BARE_GROUPS):
         if not words:
             _show_gallery()
         words.append("--help")

@@ -100,6 +100,9 @@ COMMANDS = (
 )
 """All commands, in the order of the help pages."""
 
+BARE_GROUPS = frozenset(GROUPS) - {command.words for command in COMMANDS}
+"""Groups whose name alone runs no command."""
+
 
 def command_tree(words: Sequence[str] = ()) -> typer.Typer:
     """Return the commands whose first word is that of a command line; all if there is none.
@@ -126,17 +129,17 @@ def command_tree(words: Sequence[str] = ()) -> typer.Typer:
     chosen = [command for command in COMMANDS if command.words.split()[:1] == list(words[:1])] or COMMANDS
     groups: dict[str, typer.Typer] = {}
     for command in chosen:
-        group, _, name = command.words.rpartition(" ")
         module = import_module(f".{command.module}", __package__)
         run, epilog = getattr(module, command.function), getattr(module, command.epilog) if command.epilog else None
-        if command.words in GROUPS:
-            group = command.words
-        if group and group not in groups:
-            groups[group] = typer.Typer(help=GROUPS[group])
-        if command.words in GROUPS:
-            groups[group].callback(invoke_without_command=True, epilog=epilog)(run)
+        first, *below = command.words.split()
+        if first not in GROUPS:
+            app.command(first, epilog=epilog)(run)
+            continue
+        group = groups.setdefault(first, typer.Typer(help=GROUPS[first]))
+        if below:
+            group.command(*below, epilog=epilog)(run)
         else:
-            (groups[group] if group else app).command(name, epilog=epilog)(run)
+            group.callback(invoke_without_command=True, epilog=epilog)(run)
     for name in GROUPS:
         if name in groups:
             app.add_typer(groups[name], name=name)

@@ -278,13 +278,17 @@ def _is_doubtful_cell(data, nodes, nx, ny, crossings, iris_radius, late):
 @borrowing
 def passes(data, k, crossings, iris_radius):
     """Return whether a ray passes every rim, and the circle around the iris at each crossing."""
-    if data[k, ALIVE] == 0.0 or data[k, REL] > RIM:
-        return False
+    return not (data[k, ALIVE] == 0.0 or data[k, REL] > RIM or _beyond_iris(data, k, crossings, iris_radius))
+
+
+@borrowing
+def _beyond_iris(data, k, crossings, iris_radius):
+    """Return whether a ray that did not end crosses the stop outside the circle around the iris, at any crossing."""
     for c in range(crossings):
         u, v = data[k, STOP_X + 2 * c], data[k, STOP_X + 2 * c + 1]
         if u * u + v * v > iris_radius * iris_radius:
-            return False
-    return True
+            return True
+    return False
 
 
 @borrowing
@@ -384,11 +388,7 @@ def _failure(data, k, crossings, iris_radius):
     """Return the number of surfaces that a ray passed before it ended; -1: beyond a rim, -2: the iris, -3: both."""
     if data[k, ALIVE] == 0.0:
         return data[k, X]
-    at_iris = False
-    for c in range(crossings):
-        u, v = data[k, STOP_X + 2 * c], data[k, STOP_X + 2 * c + 1]
-        at_iris = at_iris or u * u + v * v > iris_radius * iris_radius
-    if not at_iris:
+    if not _beyond_iris(data, k, crossings, iris_radius):
         return -1.0
     return -3.0 if data[k, REL] > RIM else -2.0
 
