@@ -20,7 +20,7 @@ from flarewright.optics.rays.path_reflectance import (
     coating_curves,
     path_spectra,
     products_between,
-    step_squares,
+    spectra_of_rays,
 )
 from flarewright.optics.rays.pupil_region import find_region
 from flarewright.render.scene.resolve import load_lens
@@ -52,13 +52,13 @@ def test_a_ray_passes_what_its_curve_says(name, first, second):
     rays = np.stack([trace_points(packed, w, path, TILT, points) for w in range(len(waves))])
     lit = ((rays[..., ALIVE] > 0.0) & (rays[..., REL] <= 1.0)).all(axis=0)
     assert lit.sum() >= 3
-    squares = step_squares(packed, path, TILT, points[lit])
-    assert squares.shape == (lit.sum(), len(path.rows))
-    for ray, square in zip(np.flatnonzero(lit), squares, strict=True):
-        curve = path_spectra(curves, [path], square[None]).passed[0]
-        reported, carried = np.interp(waves, CURVE_NM, curve), rays[:, ray, WEIGHT]
+    middle = len(waves) // 2
+    for ray in np.flatnonzero(lit):
+        found = spectra_of_rays(packed, path, TILT, curves, points[[ray]], middle)
+        assert found is not None
+        np.testing.assert_array_equal(*found.passed)
+        reported, carried = np.interp(waves, CURVE_NM, found.passed[0]), rays[:, ray, WEIGHT]
         # the only difference is that rays diverge with the colour
-        middle = len(waves) // 2
         assert reported[middle] == pytest.approx(carried[middle], rel=5e-3)
         assert np.abs(reported - carried).max() < 0.012 * carried.max()
 

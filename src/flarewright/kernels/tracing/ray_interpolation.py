@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..jit.decorators import compiled
+from ..jit.decorators import borrowing, compiled
 from .representative_rays import lands_at, passes, within_blades
-from .sequential import ALIVE, WEIGHT
+from .sequential import ALIVE, REL, WEIGHT, X, Y
 
 # rounding error of a sum of weights that is 1
 _ROUNDING = 1e-9
@@ -80,24 +80,36 @@ def visible_areas(traced, shares, nearest, pupil, triangles, iris_radius, blades
         near = nearest[m]
         exact = shares[m, near] == 1.0
         for k in range(pupil.shape[0]):
-            for column in range(traced.shape[2]):
-                ray[0, column] = traced[near, k, column]
+            between = False
             if not exact:
                 alive = 0.0
                 for t in range(traced.shape[0]):
                     alive += shares[m, t] * traced[t, k, ALIVE]
-                if abs(alive - 1.0) < _ROUNDING:
-                    for column in range(traced.shape[2]):
-                        value = 0.0
-                        for t in range(traced.shape[0]):
-                            value += shares[m, t] * traced[t, k, column]
-                        ray[0, column] = value
+                between = abs(alive - 1.0) < _ROUNDING
+            # most rays fail at a rim, where nothing else of them counts
+            ray[0, REL] = _column_at(traced, shares, m, near, between, k, REL)
+            if not ray[0, REL] <= 1.0:
+                continue
+            for column in range(traced.shape[2]):
+                if column != REL:
+                    ray[0, column] = _column_at(traced, shares, m, near, between, k, column)
             # the same at both halves
             if not passes(ray, 0, iris_radius):
                 continue
             for half in range(axes.shape[0]):
                 if within_blades(ray, 0, blades, axes[half]):
-                    column, row = lands_at(places[half], ray[0, 0], ray[0, 1])
+                    column, row = lands_at(places[half], ray[0, X], ray[0, Y])
                     if 0.0 <= column < width and 0.0 <= row < height:
                         areas[m] += own[k]
     return areas
+
+
+@borrowing
+def _column_at(traced, shares, m, near, between, k, column):
+    """Return a column of a ray at the m-th wavelength: interpolated, or that of the nearest traced one."""
+    if not between:
+        return traced[near, k, column]
+    value = 0.0
+    for t in range(traced.shape[0]):
+        value += shares[m, t] * traced[t, k, column]
+    return value

@@ -4,7 +4,7 @@ from math import sqrt
 
 import numpy as np
 
-from ..jit.decorators import borrowing, compiled
+from ..jit.decorators import borrowing, compiled, inner
 from .clip import blade_value
 from .sequential import ALIVE, REL, STOP_X, X, Y
 
@@ -67,6 +67,13 @@ def seen_rays(rays, iris_radius, blades, axes, place, width, height):
     ndarray, shape (N,), bool
     """
     seen = np.empty(rays.shape[0], dtype=np.bool_)
+    _see(rays, iris_radius, blades, axes, place, width, height, seen)
+    return seen
+
+
+@borrowing
+def _see(rays, iris_radius, blades, axes, place, width, height, seen):
+    """Fill which rays pass and land in the picture; arguments as in `seen_rays`."""
     everywhere = width == np.inf
     for k in range(rays.shape[0]):
         seen[k] = False
@@ -75,7 +82,33 @@ def seen_rays(rays, iris_radius, blades, axes, place, width, height):
         x, y = rays[k, X], rays[k, Y]
         column, row = lands_at(place, x, y)
         seen[k] = everywhere or (0.0 <= column < width and 0.0 <= row < height)
-    return seen
+
+
+@compiled
+def choose_seen(rays, pupil, triangles, every, iris_radius, blades, axes, places, width, height, count):
+    """Choose nodes as `choose_representatives` does, among those whose rays `seen_rays` finds at one wavelength.
+
+    Parameters
+    ----------
+    rays, iris_radius, blades, width, height
+        As in `seen_rays`.
+    pupil, triangles, every, count
+        As in `choose_representatives`.
+    axes, places : ndarray, shape (H, 2, 2) and (H, 2, 3)
+        As in `seen_rays`, of each half of the bundle.
+
+    Returns
+    -------
+    ndarray, int64
+        Nodes of the bundle, of either half; empty if no ray is seen.
+    """
+    passing = np.empty((axes.shape[0], rays.shape[0]), dtype=np.bool_)
+    for half in range(axes.shape[0]):
+        _see(rays, iris_radius, blades, axes[half], places[half], width, height, passing[half])
+    chosen = _choose(pupil, triangles, every, passing, count)
+    for k in range(chosen.size):
+        chosen[k] %= rays.shape[0]
+    return chosen
 
 
 @compiled
@@ -99,6 +132,12 @@ def choose_representatives(pupil, triangles, every, passing, count):
     ndarray, int64
         `count` nodes, plus N times their half; empty if no node passes.
     """
+    return _choose(pupil, triangles, every, passing, count)
+
+
+@inner
+def _choose(pupil, triangles, every, passing, count):
+    """Choose nodes; arguments and result as of `choose_representatives`."""
     halves, nodes = passing.shape
     reached = np.empty(3 * halves * (-(-triangles.shape[0] // every)))
     total = 0.0

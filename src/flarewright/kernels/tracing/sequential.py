@@ -29,7 +29,7 @@ from .refract import (  # fmt: skip
 
 __all__ = [
     "ALIVE", "KEEP", "LAND", "LANES", "REFLECT", "REFRACT", "REL", "STOP", "STOP_X", "WEIGHT", "X", "Y", "bend",
-    "trace_hits", "trace_lanes", "trace_nodes", "trace_squares",
+    "trace_hits", "trace_lanes", "trace_nodes",
 ]  # fmt: skip
 
 
@@ -250,12 +250,6 @@ def trace_lanes(steps, lens, light, px, py, out, squares=None):
 def trace_nodes(steps, lens, light, px, py, out):
     """Trace rays as `trace_lanes` does; for calls from Python only, kernels call `trace_lanes`."""
     trace_lanes(steps, lens, light, px, py, out)
-
-
-@compiled
-def trace_squares(steps, lens, light, px, py, out, squares):
-    """Trace rays as `trace_lanes` does, with their angles of incidence; for calls from Python only."""
-    trace_lanes(steps, lens, light, px, py, out, squares)
 
 
 @compiled

@@ -7,7 +7,8 @@
 - `ghost_table`: `GhostQuery`, `pack_for_query`, `ghost_table`: flux, position and size of every path
 - `image_height`: `image_heights`, distortion
 - `pack`: `PackedLens`, `pack_lens`, `resolve_coatings`, `facing`
-- `path_reflectance`: `coating_curves`, `path_spectra`, `products_between`, coatings between the traced wavelengths
+- `path_reflectance`: `coating_curves`, `path_spectra`, `spectra_of_rays`, `products_between`, coatings between the
+  traced wavelengths
 - `pupil_region`: `find_region`, `first_look`, `Region`
 - `single_rays`: `trace_polylines`
 - `steepness`: `interpolation_error`, `gap_errors`, `throughput_ratios`, throughput that changes fast with wavelength

@@ -14,8 +14,7 @@ from functools import cache, cached_property, lru_cache
 import numpy as np
 
 from ...colorimetry import VISIBLE_NM
-from ...kernels.paraxial.path_reflectance import path_throughput, throughput_between
-from ...kernels.tracing.sequential import ALIVE, STOP_X, trace_squares
+from ...kernels.paraxial.path_reflectance import path_throughput, ray_throughput, throughput_between
 from ...model import Coating, Lens, Medium, Stop
 from ...model.project.light import Spectrum
 from ...typing import Floats, Indices
@@ -211,8 +210,8 @@ def path_spectra(curves: BandCurves, paths: Sequence[LightPath], squares: Floats
     curves : BandCurves
     paths : sequence of LightPath
     squares : ndarray, shape (N, steps)
-        Of N rays per path: squared sines on the side of the lower index at the steps of all concatenated paths
-        (`step_squares`).
+        Of N rays per path: squared sines on the side of the lower index at the steps of all concatenated paths; 1 under
+        total reflection.
 
     Returns
     -------
@@ -255,8 +254,10 @@ def products_between(
     return through
 
 
-def step_squares(packed: PackedLens, path: LightPath, tilt: float, points: Floats, wave: int | None = None) -> Floats:
-    """Return the angles at which traced rays meet the surfaces of a path.
+def spectra_of_rays(
+    packed: PackedLens, path: LightPath, tilt: float, curves: BandCurves, points: Floats, wave: int
+) -> PathSpectrum | None:
+    """Multiply R and T along a path at the angles of traced rays, for all wavelengths.
 
     Parameters
     ----------
@@ -264,19 +265,23 @@ def step_squares(packed: PackedLens, path: LightPath, tilt: float, points: Float
     path : LightPath
     tilt : float
         From `optics.rays.bundle.incidence`.
+    curves : BandCurves
     points : ndarray, shape (N, 2)
         On the plane of the first vertex, meridional frame, mm.
-    wave : int, optional
-        Index of the traced wavelength; None: the middle one.
+    wave : int
+        Index of the traced wavelength.
 
     Returns
     -------
-    ndarray, shape (N, S)
-        Squared sines on the side of the lower index at every step; 1 under total reflection. Only rays that reach the
-        sensor's plane, so N can be smaller.
+    PathSpectrum or None
+        Two means: of every other ray that reaches the sensor's plane, and of the rest. None if no ray does.
     """
-    wave = len(packed.n_gap) // 2 if wave is None else wave
-    data, squares = np.empty((len(points), STOP_X + 2 * path.stop_crossings)), np.empty((len(points), len(path.rows)))
-    x, y = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
-    trace_squares(*tracing_arguments(packed, wave, path, tilt), x, y, data, squares)
-    return squares[data[:, ALIVE] > 0.0]
+    through = np.empty((2, curves.reflectance.shape[2]))
+    x, y = np.ascontiguousarray(points.T)
+    reached = ray_throughput(
+        *tracing_arguments(packed, wave, path, tilt), x, y, path.stop_crossings,
+        np.ascontiguousarray(curves.reflectance), through,
+    )  # fmt: skip
+    if reached == 0:
+        return None
+    return PathSpectrum(through[:, : len(CURVE_NM)], through[:, len(CURVE_NM) :])

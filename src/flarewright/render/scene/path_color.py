@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernels.tracing.ray_interpolation import visible_areas
-from ...kernels.tracing.representative_rays import choose_representatives, seen_rays
+from ...kernels.tracing.representative_rays import choose_representatives, choose_seen, seen_rays
 from ...model import Lens
 from ...optics.colour.spectrum import hats
 from ...optics.lens.paths import LightPath, direct_path
 from ...optics.rays.bundle import Bundle
-from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum, path_spectra, step_squares
+from ...optics.rays.path_reflectance import CURVE_NM, PathSpectrum, path_spectra, spectra_of_rays
 from ...optics.rays.steepness import curve_hats
 from ...typing import Floats, Mask
 from .shot import Shot, seen_light
@@ -68,13 +68,10 @@ def _sampled_spectrum(
     assert shot.curves is not None
     found_nm, passed, carried = [], [], []
     for wave, rays in _representative_rays(shot, bundle, to_pixels, count):
-        squares = step_squares(shot.packed, path, shot.incidence.tilt, bundle.pupil[rays], wave)
-        if len(squares) == 0:
-            continue
         # rays are in the order of the pupil's area, so both halves of them cover it
-        even = len(squares) // 2 * 2
-        halves = [squares[:even:2], squares[1:even:2]] if even else [squares, squares]
-        both = path_spectra(shot.curves, [path, path], np.concatenate(halves, axis=1))
+        both = spectra_of_rays(shot.packed, path, shot.incidence.tilt, shot.curves, bundle.pupil[rays], wave)
+        if both is None:
+            continue
         found_nm.append(shot.packed.wavelengths_nm[wave])
         passed.append(both.passed)
         carried.append(both.carried.mean(axis=0))
@@ -113,16 +110,39 @@ def _representative_rays(
     in_picture, anywhere = (pixel_frame(shot, to_pixels), shot.size_px), (np.zeros((2, 3)), (np.inf, np.inf))
     no_blades = np.empty((0, 4))
     for (place, size_px), blades in ((in_picture, None), (anywhere, None), (anywhere, no_blades)):
-        seen = _visible(shot, place, size_px, bundle.halves, blades)
-        chosen = [(w, spread_rays(bundle, (w,), seen, n)[0]) for w, n in zip(waves, counts, strict=True) if n > 0]
+        choose = _chooser(shot, bundle, place, size_px, blades)
+        chosen = [(w, choose(w, n)) for w, n in zip(waves, counts.tolist(), strict=True) if n > 0]
         if found := [(w, rays) for w, rays in chosen if rays.size > 0]:
             return found
         # a sliver can pass at one end of the spectrum only, where the light is faint
         for w in (w for w, n in zip(waves, counts, strict=True) if n == 0):
-            rays, _ = spread_rays(bundle, (w,), seen, count)
-            if rays.size > 0:
+            if (rays := choose(w, count)).size > 0:
                 return [(w, rays)]
     return []
+
+
+def _chooser(
+    shot: Shot, bundle: Bundle, place: Floats, size_px: tuple[float, float], blades: Floats | None
+) -> Callable[[int, int], NDArray[np.intp]]:
+    """Return a function that chooses so many nodes of a bundle that are seen at a wavelength, as `_visible` has it."""
+    opening, width, height = shot.opening, float(size_px[0]), float(size_px[1])
+    blades = opening.blades if blades is None else blades
+    axes, places = _frames(shot, place, bundle.halves)
+    every = _stride(bundle)
+
+    def choose(wave: int, count: int) -> NDArray[np.intp]:
+        nodes: NDArray[np.intp] = choose_seen(
+            bundle.traced[wave], bundle.pupil, bundle.triangles, every, opening.radius, blades, axes, places,
+            width, height, count,
+        )  # fmt: skip
+        return nodes
+
+    return choose
+
+
+def _stride(bundle: Bundle) -> int:
+    """Return every which triangle of a bundle's grid is used to choose rays."""
+    return max(1, len(bundle.triangles) // TRIANGLES)
 
 
 def spread_rays(
@@ -152,8 +172,7 @@ def spread_rays(
     for w in waves:
         for half, one in enumerate(passes):
             passing[half] |= one(bundle.traced[w])
-    every = max(1, len(bundle.triangles) // TRIANGLES)
-    chosen: NDArray[np.intp] = choose_representatives(bundle.pupil, bundle.triangles, every, passing, count)
+    chosen: NDArray[np.intp] = choose_representatives(bundle.pupil, bundle.triangles, _stride(bundle), passing, count)
     return chosen % nodes, chosen // nodes
 
 
