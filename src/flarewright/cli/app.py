@@ -15,6 +15,7 @@ from typing import Any
 import typer
 
 from ..errors import FlarewrightError
+from ..jobs.one_heap import share_one_heap
 from ..kernels.jit.warmup_processes import head_start
 from .command_tree import BARE_GROUPS, command_tree
 from .common import end_as_interrupted, end_at_once, was_interrupted
@@ -33,6 +34,7 @@ def main() -> None:
     """Run the program with the arguments of the process, and exit."""
     # imported objects live until the end, so exclude them from garbage collection
     gc.set_threshold(100_000)
+    share_one_heap()
     if isinstance(sys.stderr, io.TextIOWrapper):
         sys.stderr = _lossy(sys.stderr)
     end_as_interrupted()

@@ -14,6 +14,8 @@ from queue import SimpleQueue
 from threading import Lock, Thread
 from typing import Any
 
+from .one_heap import share_one_heap
+
 WRITING = Lock()
 """Held while a result is written, so that a process whose parent has ended leaves no temporary file."""
 
@@ -25,6 +27,7 @@ def serve() -> None:
     `function(context, item, threads)`, answered by ("done", result), ("refused", sentence, problems), ("memory",) or
     ("failed", traceback).
     """
+    share_one_heap()
     answers = os.fdopen(os.dup(1), "wb")
     as_child()
     items: SimpleQueue[Any] = SimpleQueue()

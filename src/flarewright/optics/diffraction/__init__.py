@@ -5,4 +5,5 @@
 - `fft_size`: `fast_size`, array lengths with fast transforms
 - `fraunhofer`: `pupil_pattern`, `spike_profile`, starburst patterns
 - `fresnel`: `fresnel_grid`, `band_pattern`, `fresnel_intensity`, patterns of any opening by FFT
+- `table_blocks`: `TableBlocks`, `common_block`, memory of many tables that a kernel reads as one array
 """

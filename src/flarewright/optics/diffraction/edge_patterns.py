@@ -22,6 +22,7 @@ from ..pupil.blade_form import BladeForm, to_corner
 from ..pupil.iris import coverage, softened
 from .fft_size import fast_size
 from .fresnel import FADE, REACH, ending
+from .table_blocks import TableBlocks
 
 CORNER_SAMPLES = 16
 """Samples per s of the table around a corner."""
@@ -44,10 +45,16 @@ LEAST_SPREAD, LEAST_PIXEL = 3e-3, 0.1
 KEPT_AVERAGES, KEPT_BANDS = 384, 96
 """Cache sizes in tables of a few hundred kB each: a zoom's ghosts use some 300 repeatedly."""
 
+BLOCK = 34_000_000
+"""Values in a block of memory of the averaged tables: about as many as the cache holds."""
+
 # samples per s of the wave: the finest fringes in the table have a period of 2.25 samples
 _WAVE_SAMPLES = 8
 # straight blades are alike at every s: an arbitrary offset, in s
 _STRAIGHT_OFFSET = 64.0
+
+# a ghost's crossings have different tables, which the kernel reads from one array
+_BLOCKS = TableBlocks(BLOCK)
 
 
 @dataclass(frozen=True)
@@ -83,7 +90,7 @@ class EdgeTables:
         fine = np.linspace(0.0, count - 1.0, self.edge_count)
         profile = np.interp(fine, np.arange(count), self.profile).astype(np.float32)
         beyond = np.zeros(self.corner.shape[1] + 2, dtype=np.float32)
-        values = np.concatenate([self.corner.ravel(), profile, beyond])
+        values = _BLOCKS.joined([self.corner, profile, beyond])
         return replace(self, corner=values[: self.corner.size].reshape(self.corner.shape), values=values)
 
     @property
@@ -260,7 +267,7 @@ def _upsampled(spectrum: NDArray[np.complex128], finer: int, axis: int) -> NDArr
     return np.asarray(finer * np.fft.ifft(wide, axis=axis))
 
 
-@lru_cache(maxsize=1)
+# not cached: a lasting table would keep its block of memory
 def sharp_tables() -> EdgeTables:
     """Return tables of the geometric opening, with a border one sample of the corner's table wide; for any s."""
     across = np.arange(-PROFILE_SAMPLES, PROFILE_SAMPLES + 1) / PROFILE_SAMPLES

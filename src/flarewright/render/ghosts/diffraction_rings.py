@@ -35,6 +35,7 @@ from ...optics.diffraction.fresnel import (
     fresnel_intensity,
     halved_pattern,
 )
+from ...optics.diffraction.table_blocks import common_block
 from ...optics.lens.paths import LightPath
 from ...optics.pupil.blade_form import BladeForm, blade_form
 from ...optics.pupil.iris import resampled
@@ -212,6 +213,8 @@ class Ringing:
         values = [piece.values for piece in pieces]
         if len(values) == 1:
             patterns, starts = values[0], [0]
+        elif (shared := common_block(values)) is not None:
+            patterns, starts = shared
         elif lasting:
             patterns, starts = self._buffers.laid(values)
         else:
