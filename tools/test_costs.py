@@ -1,7 +1,7 @@
 """Costs of the tests: CPU seconds of every test, with child processes and compilation in separate columns.
 
     python tools/test_costs.py run out/costs -m slow      # pytest with these arguments; one file per process
-    python tools/test_costs.py table out/costs --by file  # or folder, test; the most expensive first
+    python tools/test_costs.py table out/costs --by file  # or folder, test, kernel; the most expensive first
 
 `pytest --durations` shows wall-clock seconds, which depend on the load of the machine. CPU seconds depend less on it;
 compilation of a kernel counts for the test that calls it first.
@@ -28,24 +28,36 @@ FOLDER = "FLAREWRIGHT_TEST_COSTS"
 
 
 class Compiling:
-    """Sums this thread's CPU seconds in Numba's compiler."""
+    """Sums this thread's CPU seconds in Numba's compiler, and keeps those of each kernel."""
 
     def __init__(self) -> None:
         from numba.core import event
 
         costs = self
-        costs.seconds, costs._depth, costs._started = 0.0, 0, 0.0
+        self.seconds = 0.0
+        self.kernels: list[dict[str, Any]] = []
+        # start of each kernel that is being compiled, and the seconds of the kernels that it calls
+        open_ones: list[list[float]] = []
 
         class Listener(event.Listener):
             def on_start(self, _: Any) -> None:
-                costs._depth += 1
-                if costs._depth == 1:
-                    costs._started = time.thread_time()
+                open_ones.append([time.thread_time(), 0.0])
 
-            def on_end(self, _: Any) -> None:
-                costs._depth -= 1
-                if costs._depth == 0:
-                    costs.seconds += time.thread_time() - costs._started
+            def on_end(self, what: Any) -> None:
+                started, of_callees = open_ones.pop()
+                spent = time.thread_time() - started
+                if open_ones:
+                    open_ones[-1][1] += spent
+                else:
+                    costs.seconds += spent
+                if not what.data:
+                    # a test reports a compilation that is none
+                    return
+                function = what.data["dispatcher"].py_func
+                name = f"{function.__module__.removeprefix('flarewright.kernels.')}.{function.__name__}"
+                types = ", ".join(map(str, what.data["args"]))
+                row = {"kernel": name, "types": types, "own": round(spent - of_callees, 3), "cpu": round(spent, 3)}
+                costs.kernels.append(row)
 
         event.register("numba:compile", Listener())
 
@@ -70,6 +82,9 @@ class Recorder:
         own, children, compiling, wall = (round(b - a, 3) for a, b in zip(before, self.now(), strict=True))
         row = {"test": test, "cpu": own + children, "children": children, "compiling": compiling, "wall": wall}
         self.stream.write(json.dumps(row) + "\n")
+        for each in self.compiling.kernels:
+            self.stream.write(json.dumps({**each, "caller": test}) + "\n")
+        self.compiling.kernels.clear()
 
     @pytest.hookimpl(hookwrapper=True)
     def pytest_runtest_setup(self, item: pytest.Item) -> Iterator[None]:
@@ -130,6 +145,8 @@ def table(folder: Path, by: str, most: int) -> int:
             if "process" in row:
                 processes.append(row["process"])
                 continue
+            if "kernel" in row:
+                continue
             file = row["test"].split("::")[0]
             key = {"folder": file.rpartition("/")[0], "file": file, "test": row["test"]}[by]
             tests[key].add(row["test"])
@@ -144,6 +161,25 @@ def table(folder: Path, by: str, most: int) -> int:
     return 0
 
 
+def kernel_table(folder: Path, most: int) -> int:
+    """Print the kernels that took longest to compile, without those that they call; each with its first test."""
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    rows: dict[str, list[dict[str, Any]]] = defaultdict(list)
+    for path in sorted(folder.glob("*.jsonl")):
+        for row in map(json.loads, path.read_text(encoding="utf-8").splitlines()):
+            if "kernel" in row:
+                rows[row["kernel"]].append(row)
+    print("| kernel | compiled | types | CPU s | with callees | first test |\n|---|---|---|---|---|---|")
+    for name, each in sorted(rows.items(), key=lambda item: -sum(one["own"] for one in item[1]))[:most]:
+        own, cpu = (sum(one[column] for one in each) for column in ("own", "cpu"))
+        types = len({one["types"] for one in each})
+        print(f"| {name} | {len(each)} | {types} | {own:.2f} | {cpu:.2f} | {each[0]['caller']} |")
+    every = [one for each in rows.values() for one in each]
+    own, types = sum(one["own"] for one in every), len({(one["kernel"], one["types"]) for one in every})
+    print(f"| all | {len(every)} | {types} | {own:.2f} | | |")
+    return 0
+
+
 COLUMNS = ("cpu", "children", "compiling", "wall")
 
 
@@ -155,13 +191,15 @@ def main() -> int:
     one.add_argument("folder", type=Path)
     one = commands.add_parser("table", help="print the most expensive tests")
     one.add_argument("folder", type=Path)
-    one.add_argument("--by", choices=("folder", "file", "test"), default="file")
+    one.add_argument("--by", choices=("folder", "file", "test", "kernel"), default="file")
     one.add_argument("--most", type=int, default=100, metavar="N", help="rows to print (default: 100)")
     args, words = parser.parse_known_args()
     if args.command == "run":
         return run(args.folder, words)
     if words:
         parser.error(f"unknown: {' '.join(words)}")
+    if args.by == "kernel":
+        return kernel_table(args.folder, args.most)
     return table(args.folder, args.by, args.most)
 
 
