@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 from numba import njit, types
-from numba.core import compiler, ir, postproc, targetconfig
+from numba.core import compiler, ir, postproc, ssa, targetconfig
 
 from flarewright.kernels.jit import decorators, type_memo
 from flarewright.kernels.jit.type_memo import quickly
@@ -128,6 +128,22 @@ def test_variables_are_listed_as_numba_lists_them():
         assert ir.Inst._rec_list_vars is type_memo._rec_list_vars
         ours = [statement.list_vars() for statement in statements]
     assert ours == theirs
+
+
+def test_each_assignment_gets_numbas_variable():
+    def rewritten():
+        function = function_of(build_mesh)
+        before = {label: list(map(str, block.body)) for label, block in function.blocks.items()}
+        after = {label: list(map(str, block.body)) for label, block in ssa.reconstruct_ssa(function).blocks.items()}
+        assert sum(after[label] != before[label] for label in before) > 20
+        return after
+
+    theirs = rewritten()
+    with quickly():
+        ours = rewritten()
+    assert any(".phi" in line or "phi(" in line for body in theirs.values() for line in body)
+    assert ours == theirs
+    assert not type_memo._names
 
 
 def test_live_variables_are_computed_on_access():

@@ -2,7 +2,8 @@
 
 To type a product of two numbers Numba tries ten templates, again for every product. It also computes the live variables
 of every block although few passes read them, and copies a function's statements, with all its variables, to inline it.
-The replacements in this module return the same answers sooner; the machine code does not change.
+For every variable that is assigned twice it visits each statement of the function two times. The replacements in this
+module return the same answers sooner; the machine code does not change.
 
 They are active only while our kernels compile, which Numba's lock keeps to one thread: `quickly` installs them and then
 restores Numba's functions.
@@ -15,7 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from numba.core import analysis, base, inline_closurecall, ir, postproc, targetconfig, transforms, types
+from numba.core import analysis, base, inline_closurecall, ir, postproc, ssa, targetconfig, transforms, types
 from numba.core.types.functions import BaseFunction
 
 # Numba's stubs do not know these
@@ -23,6 +24,7 @@ _Context: Any = base.BaseContext
 _Function: Any = BaseFunction
 _Inst: Any = ir.Inst
 _PostProcessor: Any = postproc.PostProcessor
+_ssa: Any = ssa
 _flags: Any = targetconfig.ConfigStack.top_or_none
 _live_variables: Any = analysis.compute_live_variables
 _Lifetime: Any = vars(postproc)["VariableLifetime"]
@@ -43,6 +45,8 @@ _calls: list[tuple[Any, _Calls]] = []
 _calls_of: dict[int, tuple[Any, _Calls]] = {}
 # sizes of LLVM types, bytes
 _sizes: dict[Any, int] = {}
+# id of a statement -> statement, which stays alive so that no other gets its id, and the names of its variables
+_names: dict[int, tuple[Any, frozenset[str]]] = {}
 # by class: whether its values are variables, contain variables, or neither
 _kinds: dict[type, str] = {}
 
@@ -158,6 +162,36 @@ class _NoCopy:
         return value
 
 
+def _run_ssa(blocks: Any) -> Any:
+    """Give each assignment its own variable; forget the names in statements, which other passes change."""
+    try:
+        return _originals[_run_ssa](blocks)
+    finally:
+        _names.clear()
+
+
+def _run_block_rewrite(blocks: Any, states: Any, handler: Any) -> dict[Any, Any]:
+    """Give each statement that has the variable in question to a handler, which returns the statement to put there."""
+    name, rewritten = states["varname"], {}
+    for label, block in blocks.items():
+        states["label"], states["block"] = label, block
+        rewritten[label] = ir.Block(scope=block.scope, loc=block.loc)
+        rewritten[label].body = [
+            (handler.on_assign if isinstance(one, ir.Assign) else handler.on_other)(states, one)
+            if name in _names_in(one)
+            else one
+            for one in block.body
+        ]
+    return rewritten
+
+
+def _names_in(statement: Any) -> frozenset[str]:
+    known = _names.get(id(statement))
+    if known is None:
+        known = _names[id(statement)] = statement, frozenset(one.name for one in statement.list_vars())
+    return known[1]
+
+
 def _get_abi_sizeof(self: Any, ty: Any) -> int:
     """Return the size of an LLVM type in bytes; without the memo Numba lets LLVM parse a module for it."""
     if ty not in _sizes:
@@ -165,12 +199,14 @@ def _get_abi_sizeof(self: Any, ty: Any) -> int:
     return _sizes[ty]
 
 
-# the functions of Numba to replace: class, attribute, replacement
+# the functions of Numba to replace: class or module, attribute, replacement
 _PATCHES: tuple[tuple[Any, str, Any], ...] = (
     (_Function, "get_call_type", _get_call_type),
     (_PostProcessor, "run", _run),
     (_Inst, "_rec_list_vars", _rec_list_vars),
     (_Worker, "inline_function", _inline_function),
+    (_ssa, "_run_ssa", _run_ssa),
+    (_ssa, "_run_block_rewrite", _run_block_rewrite),
     (_Context, "get_abi_sizeof", _get_abi_sizeof),
 )
 # replacement -> Numba's function, while the replacements are installed
