@@ -53,7 +53,8 @@ def trace_camera_batch(lens, samples, points, chances, batch, number, stop, fram
         stream[0], stream[1] = np.uint64(0), np.uint64(part)
         stream[2], stream[3] = np.uint64(batch), np.uint64(2 * number)
         refill(stream, pool)
-        shift[4 * part : 4 * part + 4] = pool
+        for k in range(4):
+            shift[4 * part + k] = pool[k]
     for k in range(DIMENSIONS):
         step[k] = ROOT ** -(k + 1.0)
     no_fours = np.empty((0, 2))

@@ -165,7 +165,8 @@ def throughput_between(reflectance, rows, actions, starts, squares, nodes, share
                 low, high = table[cell], table[cell + 1]
                 for m in range(waves):
                     product[m] *= 1.0 - low[m] - part * (high[m] - low[m])
-        through[p, :] = product
+        for m in range(waves):
+            through[p, m] = product[m]
 
 
 @inner

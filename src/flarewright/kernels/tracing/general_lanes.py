@@ -64,8 +64,9 @@ def trace_shapes(steps, lens, light, px, py, out, squares):
     out : ndarray, shape (N, 5 + 2 C)
         As in `trace_nodes`. A rim is decentred and tilted with its surface. For a ray that ended, the largest
         r / semi-diameter is that up to its end, and later crossings of the stop are 0.
-    squares : ndarray, shape (N, S), or None
-        As in `kernels.tracing.sequential.trace_lanes`.
+    squares : ndarray, shape (N, S)
+        As in `kernels.tracing.sequential.trace_lanes`, without rows instead of None: this code takes seconds to
+        compile, and would be compiled again for an array.
     """
     rows, actions = steps
     shapes, z_vertex, inv_semi, n_gap, reflectance, sensor_z = lens
@@ -100,7 +101,7 @@ def trace_shapes(steps, lens, light, px, py, out, squares):
                 for m in range(count):
                     out[start + m, STOP_X + 2 * crossing] = x[m] if alive[m] > 0.0 else 0.0
                     out[start + m, STOP_X + 2 * crossing + 1] = y[m] if alive[m] > 0.0 else 0.0
-                if squares is not None:
+                if squares.shape[0] > 0:
                     squares[start : start + count, step] = 0.0
                 crossing += 1
                 continue
@@ -119,7 +120,7 @@ def trace_shapes(steps, lens, light, px, py, out, squares):
                 living += alive[m]
             if living == 0.0:
                 break
-            if squares is not None:
+            if squares.shape[0] > 0:
                 for m in range(count):
                     squares[start + m, step] = 0.0 if n_in == n_out else max(1.0 - cos_low[m] * cos_low[m], 0.0)
             table = reflectance[row]

@@ -73,7 +73,10 @@ def trace_lanes(steps, lens, light, px, py, out, squares=None):
     light's ray is the irradiance at its start over that at the first vertex (`kernels.tracing.refract.ray_from_near`).
     """
     if len(lens) == SHAPED:
-        trace_shapes(steps, lens, light, px, py, out, squares)
+        if squares is None:
+            trace_shapes(steps, lens, light, px, py, out, np.empty((0, 0)))
+        else:
+            trace_shapes(steps, lens, light, px, py, out, squares)
         return
     rows, actions = steps
     curvature, conic, z_vertex, inv_semi, n_gap, reflectance, sensor_z = lens
