@@ -90,8 +90,8 @@ def pytest_make_collect_report(collector):
 
 # folders whose tests call the same kernels lie together: first those that draw, last those that measure
 ORDER = (
-    "render", "physics", "golden", "predict", "optics", "cli", "workflow", "editor", "bridges", "plates", "jobs",
-    "trust", "io", "contracts", "kernels", "design", "measure",
+    "render", "physics", "kernels/tracing", "kernels/raster", "kernels/paraxial", "golden", "predict", "optics", "cli",
+    "workflow", "editor", "bridges", "plates", "jobs", "trust", "io", "contracts", "kernels", "design", "measure",
 )  # fmt: skip
 
 
@@ -124,13 +124,19 @@ def pytest_collection_finish():
 
 @pytest.fixture(scope="session", autouse=True)
 def _one_tree_of_commands():
-    """Cache the command tree that Typer builds at every call: building it takes longer than most tested commands.
+    """Cache the commands of each first word, as the program and as Typer build them: longer than most commands take.
 
-    Tests that start a process, such as `test_the_package_runs_as_a_module`, build the tree as a user's process does.
+    Typer builds the check of an option when it first reads it. Tests that start a process, such as
+    `test_the_package_runs_as_a_module`, build everything as a user's process does.
     """
     import typer.main
 
+    from flarewright.cli import app, command_tree
+
+    trees = cache(command_tree.command_tree)
+    first_words = {command.words.split()[0] for command in command_tree.COMMANDS}
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(app, "command_tree", lambda words: trees(tuple(one for one in words[:1] if one in first_words)))
         patch.setattr(typer.main, "get_command", cache(typer.main.get_command))
         yield
 
