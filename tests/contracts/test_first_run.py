@@ -116,11 +116,11 @@ class _Watched:
         return getattr(self.kernel, name)
 
 
-def _replace_everywhere(one, other):
-    """Replace one object by another in all modules of the package."""
+def _replace_everywhere(others):
+    """Replace objects by others, which the dictionary holds by their ids, in all modules of the package."""
     for module in [each for name, each in sys.modules.items() if name.partition(".")[0] == "flarewright"]:
-        for name in [name for name, value in vars(module).items() if value is one]:
-            setattr(module, name, other)
+        for name, value in [(name, value) for name, value in vars(module).items() if id(value) in others]:
+            setattr(module, name, others[id(value)])
 
 
 @pytest.fixture
@@ -141,11 +141,9 @@ def watched_here(monkeypatch):
         called = {(name_of(root.kernel.py_func), types) for root in found for types in root.called}
         return Watching(named(called), planned, {}, [])
 
-    for root in found:
-        _replace_everywhere(root.kernel, root)
+    _replace_everywhere({id(root.kernel): root for root in found})
     yield command
-    for root in found:
-        _replace_everywhere(root, root.kernel)
+    _replace_everywhere({id(root): root.kernel for root in found})
 
 
 # kernels of measurements and searches are compiled at their first call

@@ -77,8 +77,8 @@ def test_veil_of_random_discs_is_the_transform_of_their_picture():
 @pytest.mark.parametrize(
     ("name", "iris"),
     [
-        ("dust", ROUND),
         ("fine dust", SIX),
+        pytest.param("dust", ROUND, marks=pytest.mark.slow),
         pytest.param("scratches", SIX, marks=pytest.mark.slow),
         pytest.param("fingerprint", ROUND, marks=pytest.mark.slow),
         pytest.param("dust", SIX, marks=pytest.mark.slow),
@@ -120,7 +120,7 @@ def test_parseval_in_the_fourier_core():
     "dirt",
     [
         Dirt(dust_per_mm2=20.0, dust_um=(90.0, 400.0), seed=1),
-        Dirt(dust_per_mm2=20.0, dust_um=(200.0, 200.0), seed=2),
+        pytest.param(Dirt(dust_per_mm2=20.0, dust_um=(200.0, 200.0), seed=2), marks=pytest.mark.slow),
         Dirt(scratches_per_cm2=100.0, scratch_um=120.0, scratch_mm=6.0, seed=3),
     ],
     ids=["dust", "equal dust", "scratches"],
