@@ -5,7 +5,7 @@ import numpy as np
 from ..jit.decorators import borrowing, compiled, inlined, inner
 from .cell_neighbours import EMPTY, FLAT, LEAF, SPLIT, UNKNOWN, halve_neighbours, has_lit_side, known_level, quarter_of
 from .lens_arrays import at_wavelength
-from .pupil_prepass import rejected
+from .pupil_prepass import rejected, stop_outside
 from .sequential import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_lanes
 
 # why a cell is halved, in bits above those of its verdict: `REASON * k + SPLIT` for the k-th of `REASONS`
@@ -17,6 +17,8 @@ REASONS = (
 ALL_END, NEAR_RIM, SOME_END, RIM_CORNERS, RIM_BEND, FRINGES, PLACE_BEND, FOLD, AREA_BEND, WEIGHT_BEND = range(10)
 # folds are invisible in a cell whose image lies within this part of the tolerance on either side of a line
 THIN = 0.1
+# a cell is rejected if all its nine rays exceed a limit by more than this part of its variation between them
+REJECTING = 0.25
 # largest cell in fringes, pixels: the pattern of a small cell usually depends on a single edge
 FRINGE_CELL = 128.0
 # number of halvings of cells whose rays all end, at different surfaces. For a path that passes slivers of light beside
@@ -46,14 +48,15 @@ def _classify(data, nodes, crossings, iris, level, h, limits, values):
         limits.tolerance, limits.fringe_tolerance, limits.scale, limits.view_radius
     )  # fmt: skip
     narrow = limits.slivers > 0 or limits.flux_tolerance < NARROW
-    if rejected(data, nodes, crossings, iris_radius, 0.25):
+    gap_level = limits.max_level if narrow else limits.rim_level
+    if rejected(data, nodes, crossings, iris_radius, REJECTING):
         # a sliver may pass between rays that end at different surfaces
         beside = narrow and (level == 0 or limits.slivers > 0)
         if level < SLIVER_LEVEL + limits.slivers and _ends_differ(data, nodes, beside):
             return _split(ALL_END)
         if _may_hide_horn(data, nodes, level):
             return _split(NEAR_RIM)
-        gap = narrow and level < limits.max_level and _may_hide_gap(data, nodes, values)
+        gap = level < gap_level and _may_hide_gap(data, nodes, crossings, iris_radius, view_radius, values)
         return _split(NEAR_RIM) if gap else EMPTY
     if level >= limits.max_level:
         return LEAF
@@ -74,7 +77,7 @@ def _classify(data, nodes, crossings, iris, level, h, limits, values):
         return EMPTY if alive >= FAR_RAYS and level >= FAR_LEVEL and out2 > far * far else _split(SOME_END)
     if out2 > view_radius * view_radius:
         return FLAT
-    if narrow and _may_hide_gap(data, nodes, values):
+    if level < gap_level and _may_hide_gap(data, nodes, crossings, iris_radius, view_radius, values):
         return _split(NEAR_RIM)
     extent = max(x_high - x_low, y_high - y_low) * scale
     error, reason = 0.0, RIM_BEND
@@ -178,8 +181,10 @@ def _may_hide_horn(data, nodes, level):
 
 
 @borrowing
-def _may_hide_gap(data, nodes, values):
+def _may_hide_gap(data, nodes, crossings, iris_radius, view_radius, values):
     """Return whether all rays of a cell lie beyond a rim and a gap between two rims may pass light between them.
+
+    Light that misses the iris or the picture does not count.
 
     Notes
     -----
@@ -190,7 +195,17 @@ def _may_hide_gap(data, nodes, values):
         if data[k, ALIVE] == 0.0 or data[k, REL] <= 1.0:
             return False
     low, high, bend = _limit_range(data, nodes, np.int64(0), 1.0, values)
-    return bend > KINK * (high - low) and low - bend <= 1.0
+    if bend <= KINK * (high - low) or low - bend > 1.0:
+        return False
+    for crossing in range(crossings):
+        if stop_outside(data, nodes, crossing, iris_radius, REJECTING):
+            return False
+    x_low, x_high, y_low, y_high = np.inf, -np.inf, np.inf, -np.inf
+    for k in nodes:
+        x_low, x_high = min(x_low, data[k, X]), max(x_high, data[k, X])
+        y_low, y_high = min(y_low, data[k, Y]), max(y_high, data[k, Y])
+    out_x, out_y = max(max(x_low, -x_high), 0.0), max(max(y_low, -y_high), 0.0)
+    return out_x * out_x + out_y * out_y <= view_radius * view_radius
 
 
 @borrowing

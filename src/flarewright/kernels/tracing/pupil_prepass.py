@@ -31,7 +31,7 @@ def _outside(value_low, value_high, slack):
 
 
 @borrowing
-def _stop_outside(data, nodes, crossing, iris_radius, slack):
+def stop_outside(data, nodes, crossing, iris_radius, slack):
     """Return whether a patch misses the iris at one crossing: its widened box in the stop plane lies outside."""
     u_low, u_high, v_low, v_high = np.inf, -np.inf, np.inf, -np.inf
     for k in nodes:
@@ -57,7 +57,7 @@ def rejected(data, nodes, crossings, iris_radius, slack):
     if alive == 0 or _outside(low, high, slack):
         return True
     for crossing in range(crossings):
-        if _stop_outside(data, nodes, crossing, iris_radius, slack):
+        if stop_outside(data, nodes, crossing, iris_radius, slack):
             return True
     return False
 
@@ -270,7 +270,7 @@ def _is_doubtful_cell(data, nodes, nx, ny, crossings, iris_radius, late):
     if alive < nodes.size:
         return True
     for crossing in range(crossings):
-        if _stop_outside(data, nodes, crossing, iris_radius, 1.5):
+        if stop_outside(data, nodes, crossing, iris_radius, 1.5):
             return False
     return True
 
