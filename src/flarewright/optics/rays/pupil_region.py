@@ -212,7 +212,7 @@ def find_region(
     box = first
     whole, few_cells = True, 1 if quick else FEW_CELLS
     held, slivers = np.array([np.inf, -np.inf, np.inf, -np.inf]), False
-    halved = 0
+    halved, small = 0, False
     # what the finer scans have covered
     searched = np.array([np.inf, -np.inf, np.inf, -np.inf])
     for _ in range(MOST_SCANS):
@@ -226,10 +226,12 @@ def find_region(
             finest,
             traced if whole else None,
             few_cells,
-            slivers=(whole or slivers) and not quick,
+            slivers=(whole or slivers or small) and not quick,
         )
         slivers = slivers or bool(spots[1] > spots[0])
         plenty = sums[4] >= (BLOB if whole else SMALL_REGION)
+        # the first scan's cells are too large for the slivers beside a region of few of them
+        small = small or (whole and not plenty)
         near, few = box, cells_across(packed, COARSE) if plenty else cells
         if whole and sums[4] > 0.0:
             # the whole front is too large for three scans when one colour already located the region
