@@ -1,6 +1,8 @@
 """Invalid input of any kind: exit code 2 and one clear sentence, no traceback, no partial files."""
 
+import io
 import json
+import sys
 
 import pytest
 
@@ -546,6 +548,22 @@ def test_one_bad_file_is_reported_and_the_others_are_checked(capsys, folder):
     assert [line.split(":")[1].split(",")[0] for line in out.splitlines() if line[0] != " "] == [
         " usable", " rejected", " usable"]  # fmt: skip
     assert "1 of 3 lens files were rejected" in err
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_check_of_many_files_shows_a_bar_on_terminals_only(folder, monkeypatch, capsys, terminal):
+    class Screen(io.StringIO):
+        def isatty(self):
+            return terminal
+
+    monkeypatch.setattr(sys, "stderr", screen := Screen())
+    monkeypatch.setenv("TERM", "xterm")
+    assert run(["lens", "check", *["lens.toml"] * 3]) == 0
+    assert capsys.readouterr().out.count("lens.toml: usable") == 3
+    assert ("lenses: lens.toml" in screen.getvalue()) == terminal
+    assert ("0:00:0" in screen.getvalue() or "-:--:--" in screen.getvalue()) == terminal
+    if not terminal:
+        assert screen.getvalue() == ""
 
 
 def test_all_errors_of_a_project_are_listed(capsys, folder):
