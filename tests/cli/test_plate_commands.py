@@ -49,6 +49,18 @@ def test_sources_are_listed_marked_and_written(capsys, folder):
     assert sorted(path.name for path in folder.iterdir()) == ["l.csv", "m.png", "photo.png"]
 
 
+def test_a_damaged_checkpoint_is_reported_and_the_result_is_the_same(capsys, folder, monkeypatch):
+    monkeypatch.setenv("FLAREWRIGHT_STATE", str(folder / "state"))
+    assert run(["sources", "photo.png", "--csv", "l.csv", "--json"]) == 0
+    whole = capsys.readouterr()
+    (folder / "l.lights.npz").write_bytes(b"PK\3\4")
+    assert run(["sources", "photo.png", "--csv", "l.csv", "--json"]) == 0
+    again = capsys.readouterr()
+    assert again.out == whole.out
+    assert again.err == "flarewright: l.lights.npz is damaged; its frames are searched again\n" + whole.err
+    assert not (folder / "l.lights.npz").exists()
+
+
 def test_stops_choose_the_lights(capsys, folder):
     """The flag raised KeyError wherever no project has a plate."""
     thresholds = []

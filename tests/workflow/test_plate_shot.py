@@ -221,6 +221,27 @@ def test_the_file_of_sources_is_read_again_and_a_foreign_one_is_kept(plates, tmp
     assert kept.read_bytes() == b"not ours"
 
 
+@pytest.mark.parametrize("left", ["nothing", "half", "other arrays"])
+def test_a_damaged_file_of_sources_costs_one_sentence_and_the_search(plates, tmp_path, left):
+    kept = sources_file(str(tmp_path / "f.####.exr"))
+    seen, said = [], []
+    arguments = {"kept": kept, "report": lambda frame, done, of: seen.append(frame), "announce": said.append}
+    first = plate_shot(settings(plates, threshold=1.0), [1001, 1002], **arguments)
+    assert said == []
+    data = kept.read_bytes()
+    if left == "other arrays":
+        np.savez(kept, made_of=np.array(["a"]), counts=np.array([3]), sources=np.zeros((2, 10)))
+    else:
+        kept.write_bytes(data[: len(data) // 2 if left == "half" else 0])
+    seen.clear()
+    again = plate_shot(settings(plates, threshold=1.0), [1001, 1002], **arguments)
+    assert said == [f"{kept} is damaged; its frames are searched again"]
+    assert sorted(seen) == [1001, 1002]
+    assert np.array_equal(again.lights.tracks.light, first.lights.tracks.light)
+    assert plate_shot(settings(plates, threshold=1.0), [1001, 1002], **arguments).found == first.found
+    assert len(said) == 1
+
+
 def test_a_threshold_in_stops_is_one_for_the_whole_shot(plates):
     found = plate_shot(settings(plates, stops=4.0), [1001, 1002, 1003])
     assert found.threshold == pytest.approx(0.1 * 16, rel=0.1)

@@ -16,6 +16,7 @@ from ..jobs.cluster.executor import open_cluster, workers_of
 from ..jobs.frame_list import FramePattern, chunk_of, frames_text, parse_chunk, parse_frames
 from ..jobs.processes import fitting, shares, work_off
 from ..model import Project
+from ..typing import Report
 from .frame_files import holdout_files
 from .keyframes import frame_rate, is_still, length_s, time_of
 
@@ -136,7 +137,7 @@ def shot(
         Workers of a Dask cluster draw: "local:4", "tcp://HOST:PORT" or "slurm:FILE" (docs/many-machines.md). None:
         processes of this machine.
     announce : callable, optional
-        Called with sentences about the cluster as they arise.
+        Called with sentences about the cluster and a damaged file of sources as they arise.
     radiance : bool
         The layers have the values of a picture that shows the radiance of the scene, such as a rendered one, and add
         to it as they are: the irradiances of the sensor times 4 N^2 / (pi T).
@@ -192,7 +193,7 @@ def shot(
     with open_cluster(cluster, Path(pattern.text).parent, announce) as executor:
         found = None
         if plate is not None:
-            found = _searched(project, plate, numbers, pattern, comp, processes, threads, searched, executor)
+            found = _searched(project, plate, numbers, pattern, comp, processes, threads, searched, executor, announce)
         elif comp:
             found = _own_plate(project)
         if found is not None:
@@ -312,6 +313,7 @@ def _searched(
     threads: int | None,
     report: Callable[[int, int, int], None] | None,
     executor: Cluster | None,
+    announce: Report | None,
 ) -> PlateShot:
     """Find the sources of the plate in all frames of the shot, whichever of them this process draws."""
     from ..kernels.jit.warmup_processes import cores
@@ -330,6 +332,7 @@ def _searched(
         processes=processes or threads or cores(),
         report=report,
         executor=executor,
+        announce=announce or (lambda _: None),
     )
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ...errors import ProjectError
-from ..common import one_bar, print_json, print_remarks
+from ..common import one_bar, print_json, print_remark, print_remarks
 from ..option_record import with_options
 from .options.plate import PlateOptions
 from .plate_flags import plate_settings
@@ -78,7 +78,7 @@ def sources(options: SourcesOptions) -> None:
             if progress is not None:
                 progress(done / of, f"frame {frame}")
 
-        found = plate_shot(settings, frames, kept=kept, report=report)
+        found = plate_shot(settings, frames, kept=kept, report=report, announce=print_remark)
     rows = [{"frame": frame, **row} for frame in frames for row in light_rows(found.lights, frame)]
     if marked is not None:
         _write_marked(marked, found, settings, frames)

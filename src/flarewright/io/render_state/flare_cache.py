@@ -17,6 +17,7 @@ from ...errors import FileError, FlarewrightError
 from ...typing import Pixels, Report
 from ..files.atomic_write import write_atomically
 from ..files.door import outside
+from .damaged_archive import is_rest_of_archive
 
 Pictures = dict[str, dict[tuple[float, float], Pixels]]
 
@@ -57,7 +58,7 @@ def read_cache(path: Path, report: Report = lambda _: None) -> Pictures:
         if not path.is_file():
             raise
         lost += 1
-    if lost and not found and not _is_ours(path):
+    if lost and not found and not is_rest_of_archive(path, _NAME):
         raise FlarewrightError(f"{path} holds no flares of a prediction; delete it or give another --cache")
     if lost:
         report(f"{path} is damaged; {'some of its' if found else 'its'} pictures are drawn again")
@@ -76,13 +77,6 @@ def _keep(found: Pictures, name: str, data: bytes) -> None:
     ):
         raise ValueError(name)
     found.setdefault(fingerprint, {})[float(constellation), float(roll)] = picture
-
-
-def _is_ours(path: Path) -> bool:
-    """Return whether a damaged file is certainly a cache: emptied, cut in its first name, or with names of pictures."""
-    with path.open("rb") as file:
-        data = file.read(1_000_000)
-    return (len(data) < 100 and b"PK\x03\x04".startswith(data[:4])) or _NAME.search(data) is not None
 
 
 def write_cache(path: Path, pictures: Pictures) -> None:

@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from ..._version import __version__
-from ...errors import FileError, FlarewrightError, ProjectError
-from ...io.files.atomic_write import delete_written, write_atomically
-from ...io.files.door import outside_arrays
+from ...errors import ProjectError
+from ...io.files.atomic_write import delete_written
 from ...io.files.text_file import digest_of
 from ...io.images.plate_picture import PlatePicture
 from ...jobs.frame_list import FramePattern, frames_text
@@ -29,7 +28,8 @@ from ...plates.lights import PlateTracks, plate_tracks
 from ...plates.measured_plate import measured_pixels
 from ...plates.settings import PlateSettings
 from ...plates.tracking import SourceTrackSettings, Tracks, follow, steady
-from ...typing import Floats
+from ...typing import Floats, Report
+from .kept_sources import read_sources, write_sources
 from .plate_files import is_picture, plate_digest, plate_matte, plate_name, plate_picture
 
 # frames whose mean sets a threshold in stops
@@ -145,6 +145,7 @@ def plate_shot(
     processes: int = 1,
     report: Callable[[int, int, int], None] | None = None,
     executor: Executor | None = None,
+    announce: Report = lambda _: None,
 ) -> PlateShot:
     """Find and follow the sources of a plate.
 
@@ -160,18 +161,20 @@ def plate_shot(
         Called with the frame, the number of searched frames and the number of all.
     executor : Executor, optional
         Searches instead of processes of this machine.
+    announce : callable, optional
+        Called with a sentence if the file `kept` is damaged.
 
     Raises
     ------
     FlarewrightError
-        The plates cannot be read, differ in size, or have no source at all.
+        The plates cannot be read, differ in size, or have no source at all, or `kept` is a file of another program.
     """
     first = plate_picture(settings, frames[0])
     still = is_picture(settings)
     threshold, remarks = _threshold(settings, frames[:1] if still else frames, first)
     search = _Search(settings, threshold, first.size_px)
     # one picture for all frames is searched once
-    searched = _searched(search, frames[:1] if still else frames, kept, processes, report, executor)
+    searched = _searched(search, frames[:1] if still else frames, kept, processes, report, executor, announce)
     found = [Sources.from_table(searched[frames[0] if still else frame]) for frame in frames]
     if not any(len(each) for each in found) and kept is not None:
         # an error leaves no file
@@ -267,16 +270,15 @@ def _searched(
     processes: int,
     report: Callable[[int, int, int], None] | None,
     executor: Executor | None,
+    announce: Report,
 ) -> dict[int, Floats]:
     """Return the sources of each frame, those in the file `kept` or new ones."""
     made_of = {frame: _made_of(search, frame) for frame in frames}
-    known = {} if kept is None else _read(kept)
+    known = {} if kept is None else read_sources(kept, announce)
     found = {frame: known[digest] for frame, digest in made_of.items() if digest in known}
     todo = [frame for frame in frames if frame not in found]
     # a process starts in the time of some frames
     number, each = shares(len(todo), min(processes, max(1, len(todo) // _FRAMES_A_PROCESS)))
-    if kept is not None and todo:
-        _check_ours(kept)
     saved = time.monotonic()
     try:
         for one in work_off(_FIND, search, todo, processes=number, threads=each, what="frame", executor=executor):
@@ -285,12 +287,12 @@ def _searched(
             if report is not None:
                 report(frame, len(found), len(frames))
             if kept is not None and time.monotonic() - saved > _SAVE_S:
-                _write(kept, {made_of[frame]: table for frame, table in found.items()})
+                write_sources(kept, {made_of[frame]: table for frame, table in found.items()})
                 saved = time.monotonic()
     finally:
         # also after Ctrl-C
         if kept is not None and todo and found:
-            _write(kept, {made_of[frame]: found[frame] for frame in frames if frame in found})
+            write_sources(kept, {made_of[frame]: found[frame] for frame in frames if frame in found})
     return found
 
 
@@ -304,49 +306,3 @@ def _made_of(search: _Search, frame: int) -> str:
     matte = None if settings.matte is None else digest_of(FramePattern(settings.matte).path(frame))
     parts = (__version__, repr(sorted(how.items())), repr(search.threshold), repr(search.size_px), plate, matte)
     return sha256(repr(parts).encode()).hexdigest()
-
-
-def _read(path: Path) -> dict[str, Floats]:
-    """Return the kept sources by their digests; none if the file is damaged or of another program."""
-    if not path.exists():
-        return {}
-    try:
-        with outside_arrays(path, "the sources of a plate", "delete it") as arrays:
-            names, counts, tables = arrays["made_of"], arrays["counts"], arrays["sources"]
-    except (FileError, KeyError):
-        return {}
-    whole = (
-        names.ndim == counts.ndim == 1
-        and len(names) == len(counts)
-        and counts.dtype.kind == "i"
-        and names.dtype.kind == "U"
-        and tables.ndim == 2
-        and tables.shape == (counts.sum(), 10)
-        and tables.dtype == np.float64
-        and (counts >= 0).all()
-        and np.isfinite(tables).all()
-    )
-    if not whole or not len(names):
-        return {}
-    return dict(zip((str(name) for name in names), np.split(tables, np.cumsum(counts)[:-1]), strict=True))
-
-
-def _check_ours(path: Path) -> None:
-    """Raise an error if the sources would replace a file of another program."""
-    if path.exists() and not _read(path):
-        raise FlarewrightError(f"{path} is no file of sources of a plate; move it, or choose another output name")
-
-
-def _write(path: Path, found: dict[str, Floats]) -> None:
-    """Write the sources."""
-    tables = list(found.values())
-
-    def write(temporary: Path) -> None:
-        np.savez(
-            temporary,
-            made_of=np.array(list(found), dtype="U64"),
-            counts=np.array([len(table) for table in tables], dtype=np.int64),
-            sources=np.concatenate(tables) if tables else np.zeros((0, 10)),
-        )
-
-    write_atomically(path, write)
