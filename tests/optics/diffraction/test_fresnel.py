@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -33,7 +34,7 @@ from flarewright.optics.diffraction.fresnel import (
 )
 from flarewright.optics.lens.paraxial import first_order, flare_matrices
 from flarewright.optics.lens.paths import ghost_paths
-from flarewright.optics.pupil.iris import blade_edges, coverage, resampled, softened
+from flarewright.optics.pupil.iris import blade_edges, coverage, resampled, softened, transmission
 from flarewright.optics.rays.pack import pack_lens
 from flarewright.render.scene.resolve import load_lens
 
@@ -487,13 +488,47 @@ def test_bands_share_out_all_light():
 
 
 def test_an_image_resampled_keeps_its_light_and_its_side():
-    image = np.zeros((6, 8))
+    image = np.zeros((6, 8), dtype=np.float32)
     image[0, 7] = 1.0  # up and right
     at = (np.arange(400) + 0.5) * 0.01 - 2.0
     found = resampled(image, 1.5, at, at)
     assert found.sum() * 0.01**2 == pytest.approx((3.0 / 8) * (3.0 / 6), rel=1e-3)
     assert found[at > 1.0][:, at > 1.1].max() == pytest.approx(1.0, abs=0.1)
     assert found[at < 0.5].max() == 0.0
+
+
+@pytest.mark.parametrize(("pixels", "step"), [((5, 9), 0.02), ((40, 50), 0.09), ((200, 160), 0.11)])
+def test_samples_of_an_image_are_its_means_over_triangles(pixels, step):
+    """Against sums over many points of the linear interpolation, of windows inside and across the image's border."""
+    image = np.random.default_rng(3).random(pixels, dtype=np.float32)
+    x, y = 0.3 + step * np.arange(11), -1.3 + step * np.arange(9)
+    part = (np.arange(400) + 0.5) / 200.0 - 1.0
+    shares = (1.0 - np.abs(part)) / 200.0
+
+    def means(at, count):
+        # linear interpolation is a matrix of hats around the pixels' centres
+        places = (at[:, None] + step * part + 1.0) * 0.5 * count - 0.5
+        return np.maximum(1.0 - np.abs(places[..., None] - np.arange(count)), 0.0).transpose(0, 2, 1) @ shares
+
+    wanted = means(y, pixels[0]) @ image[::-1] @ means(x, pixels[1]).T
+    assert resampled(image, 1.0, x, y) == pytest.approx(wanted, abs=2e-4)
+    assert not resampled(image, 1.0, x + 5.0, y).any()
+
+
+def test_a_large_image_is_resampled_and_rotated_without_copies_of_its_points():
+    image = np.ones((1000, 1000), dtype=np.float32)
+    at = np.linspace(-1.2, 1.2, 500)
+    tracemalloc.start()
+    resampled(image, 1.0, at, at)
+    small = tracemalloc.get_traced_memory()[1]
+    tracemalloc.reset_peak()
+    wide = np.linspace(-1.4, 1.4, 1400)
+    seen = transmission(Iris(rotation_deg=30.0), 1.0, wide, wide[:, None], mask=image)
+    large = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    # the result and one pass; the result, the image with its border, and some lines
+    assert small < 3 * image.nbytes
+    assert large < seen.nbytes + 2 * image.nbytes + 0.8 * seen.nbytes
 
 
 @pytest.mark.parametrize("blur", [0.05, 0.1, 0.3, 0.7, 1.0, 1.5, 2.5, 4.0, 7.0, 12.0, 20.0])

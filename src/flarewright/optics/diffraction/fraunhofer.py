@@ -189,8 +189,10 @@ def _picture(pixels: NDArray[np.floating] | None) -> PupilImage | None:
     if pixels is None:
         return None
     held = np.ascontiguousarray(pixels, dtype=np.float64)
-    digest = hashlib.blake2b(held.tobytes() + repr(held.shape).encode(), digest_size=16).digest()
-    return PupilImage(digest, held)
+    digest = hashlib.blake2b(repr(held.shape).encode(), digest_size=16)
+    # the array itself: its bytes would be a copy
+    digest.update(held.data)
+    return PupilImage(digest.digest(), held)
 
 
 @lru_cache(maxsize=4)

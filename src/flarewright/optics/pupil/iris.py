@@ -13,7 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from flarewright.model.lens.iris import Iris
 
-from ...typing import Floats
+from ...kernels.diffraction.image_lines import sum_lines
+from ...typing import Floats, Pixels
+
+# lines of points that an image is read at together
+_LINES = 64
 
 
 def blade_edges(iris: Iris, semi_diameter: float) -> Floats:
@@ -126,8 +130,8 @@ def transmission(
     """
     px, py = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     if mask is not None:
-        px, py = np.broadcast_arrays(px, py)
-        return _look_up(mask, iris.rotation_deg, px / semi_diameter, py / semi_diameter)
+        px, py = np.broadcast_arrays(px / semi_diameter, py / semi_diameter)
+        return _look_up(mask, iris.rotation_deg, px, py)
     return coverage(blade_edges(iris, semi_diameter), px, py, footprint)
 
 
@@ -175,56 +179,70 @@ def softened(ramp: Floats) -> Floats:
     return ramp
 
 
-def resampled(image: NDArray[np.floating], half: float, x: Floats, y: Floats) -> Floats:
+def resampled(image: Pixels, half: float, x: Floats, y: Floats) -> Pixels:
     """Average an image over triangles two samples wide.
 
     Parameters
     ----------
-    image : ndarray, shape (..., rows, columns)
-        Row 0 at the top; it spans [-half, half] squared, is linear between its pixels' centres and 0 outside. Or
-        several images.
+    image : ndarray, shape (rows, columns), float32
+        Row 0 at the top; it spans [-half, half] squared, is linear between its pixels' centres and 0 outside.
     half : float
     x, y : ndarray, shapes (Nx,) and (Ny,)
         Evenly spaced, ascending.
 
     Returns
     -------
-    ndarray, shape (..., Ny, Nx)
+    ndarray of float32, shape (Ny, Nx)
     """
-    wanted = np.asarray(image, dtype=np.float64)[..., ::-1, :]
-    lines = _averaged(wanted, *_triangles(y / half, image.shape[-2]))
-    across = np.ascontiguousarray(lines.swapaxes(-1, -2))
-    return _averaged(across, *_triangles(x / half, image.shape[-1])).swapaxes(-1, -2)
+    lines, down = _triangles(y / half, image.shape[0])
+    columns, across = _triangles(x / half, image.shape[1])
+    out = np.zeros((len(y), len(x)), dtype=np.float32)
+    # samples beyond the image stay 0, and what lies beyond the samples does not count
+    rows_lit, columns_lit = _lit(down), _lit(across)
+    if rows_lit.stop == 0 or columns_lit.stop == 0:
+        return out
+    lines, down, columns, across = lines[rows_lit], down[rows_lit], columns[columns_lit], across[columns_lit]
+    used = columns[across > 0.0]
+    left = int(used.min())
+    averaged = np.empty((len(lines), int(used.max()) + 1 - left), dtype=np.float32)
+    # up is the image's first row
+    sum_lines(image, image.shape[0] - 1 - lines, down, left, averaged)
+    turned = np.empty((len(columns), len(lines)), dtype=np.float32)
+    sum_lines(np.ascontiguousarray(averaged.T), np.maximum(columns - left, 0), across, 0, turned)
+    out[rows_lit, columns_lit] = turned.T
+    return out
 
 
-def _averaged(image: Floats, first: NDArray[np.intp], weights: Floats) -> Floats:
-    """Average rows of an image with a border of zeros, by weights of the rows from `first` on; row 0 is the border."""
-    beyond = [(0, 0)] * (image.ndim - 2) + [(1, weights.shape[1]), (0, 0)]
-    padded = np.pad(image, beyond)
-    total: Floats = weights[:, 0, None] * padded[..., first, :]
-    for k in range(1, weights.shape[1]):
-        total += weights[:, k, None] * padded[..., first + k, :]
-    return total
+def _lit(weights: Floats) -> slice:
+    """Return the samples that see the image, from the first to the last; an empty slice if none does."""
+    lit = np.flatnonzero(weights.any(axis=1))
+    return slice(int(lit[0]), int(lit[-1]) + 1) if lit.size else slice(0, 0)
 
 
 def _triangles(at: Floats, pixels: int) -> tuple[NDArray[np.intp], Floats]:
-    """Return which pixels of a line over [-1, 1] contribute to its samples: the first, and their weights, (N, K).
+    """Return which pixels of a line over [-1, 1] contribute to its samples: their numbers and weights, (N, K).
 
-    Pixels are counted from 1, with one of value 0 at either end.
+    Where there are fewer than K, the weights of the others are 0.
+
+    Notes
+    -----
+    A weight is the overlap of the sample's triangle and of the pixel's, whose linear interpolation is a triangle too:
+    the second differences of |x|^3 / 12 over both widths.
     """
-    parts = 16
-    step = float(at[1] - at[0])
-    offsets = (np.arange(2 * parts) + 0.5) / parts - 1.0
-    places = np.clip(0.5 * (at[:, None] + offsets * step + 1.0) * pixels + 0.5, 0.0, pixels + 1.0)
-    low = np.minimum(places.astype(np.intp), pixels)
-    first = low[:, 0]
-    weights = np.zeros((len(at), int((low[:, -1] - first).max()) + 2))
-    rows = np.arange(len(at))
-    for k, offset in enumerate(offsets):
-        share, upper = (1.0 - abs(offset)) / parts, places[:, k] - low[:, k]
-        weights[rows, low[:, k] - first] += share * (1.0 - upper)
-        weights[rows, low[:, k] - first + 1] += share * upper
-    return first, weights
+    step = 0.5 * pixels * float(at[1] - at[0])
+    places = 0.5 * pixels * (at + 1.0) - 0.5
+    reach = step + 1.0
+    numbers = np.floor(places - reach).astype(np.intp)[:, None] + np.arange(1, math.ceil(2.0 * reach) + 2)
+    apart = numbers - places[:, None]
+    weights = np.zeros(apart.shape)
+    for one, share in ((-1.0, 1.0), (0.0, -2.0), (1.0, 1.0)):
+        for other, part in ((-step, share), (0.0, -2.0 * share), (step, share)):
+            far = np.abs(apart + (one + other))
+            weights += part * (far * far * far)
+    # rounding leaves some just below 0
+    weights = np.maximum(weights / (12.0 * step**2), 0.0)
+    inside = (numbers >= 0) & (numbers < pixels) & (np.abs(apart) < reach)
+    return np.where(inside, numbers, 0), np.where(inside, weights, 0.0)
 
 
 def _border_value(edges: Floats, x: Floats, y: Floats) -> Floats:
@@ -280,12 +298,16 @@ def _look_up(mask: NDArray[np.floating], rotation_deg: float, x: Floats, y: Floa
     rows, columns = mask.shape
     # a border of zeros makes the interpolation fade at the image's border
     padded = np.pad(np.asarray(mask, dtype=np.float64), 1)
-    u = np.clip(0.5 * ((c * x + s * y) + 1.0) * columns + 0.5, 0.0, columns + 1.0)
-    v = np.clip(0.5 * (1.0 - (c * y - s * x)) * rows + 0.5, 0.0, rows + 1.0)
-    i = np.minimum(v.astype(np.intp), rows)
-    j = np.minimum(u.astype(np.intp), columns)
-    fv, fu = v - i, u - j
-    top = (1.0 - fu) * padded[i, j] + fu * padded[i, j + 1]
-    bottom = (1.0 - fu) * padded[i + 1, j] + fu * padded[i + 1, j + 1]
-    value: Floats = (1.0 - fv) * top + fv * bottom
+    value: Floats = np.empty(x.shape)
+    # a few lines of points at a time: a dozen arrays of all would take a gigabyte for a large image
+    for first in range(0, max(len(x), 1) if x.ndim else 1, _LINES):
+        band = slice(first, first + _LINES) if x.ndim else ()
+        u = np.clip(0.5 * ((c * x[band] + s * y[band]) + 1.0) * columns + 0.5, 0.0, columns + 1.0)
+        v = np.clip(0.5 * (1.0 - (c * y[band] - s * x[band])) * rows + 0.5, 0.0, rows + 1.0)
+        i = np.minimum(v.astype(np.intp), rows)
+        j = np.minimum(u.astype(np.intp), columns)
+        fv, fu = v - i, u - j
+        top = (1.0 - fu) * padded[i, j] + fu * padded[i, j + 1]
+        bottom = (1.0 - fu) * padded[i + 1, j] + fu * padded[i + 1, j + 1]
+        value[band] = (1.0 - fv) * top + fv * bottom
     return value

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ...kernels.raster.stop_pattern import AT_X, AT_Y, COLUMNS, CORNERS, FIRST, PER_MM_X, PER_MM_Y, ROWS, TABLE_COLUMNS
 from ...typing import Floats, Indices, Pixels
 
+Kind = TypeVar("Kind", np.float32, np.float64)
 MaskLevels = tuple[Pixels, Floats, Indices]
 
 # least number of samples per side of a level
@@ -55,14 +59,18 @@ def mask_levels(mask: Floats, half: float) -> MaskLevels:
         first += level.size
         if min(level.shape) < 2 * FEWEST:
             break
-        level = _halved(level)
+        level = halved(level)
     return np.concatenate(parts), np.stack(table), _changes(mask)
 
 
-def _halved(level: Pixels) -> Pixels:
-    level = np.pad(level, [(0, side % 2) for side in level.shape], mode="edge")
-    mean: Pixels = level[0::2] + level[1::2]
-    mean = (mean[:, 0::2] + mean[:, 1::2]) * np.float32(0.25)
+def halved(level: NDArray[Kind]) -> NDArray[Kind]:
+    """Return means of two by two samples; an odd side repeats its last sample."""
+    level = (
+        np.pad(level, [(0, side % 2) for side in level.shape], mode="edge") if any(np.mod(level.shape, 2)) else level
+    )
+    mean = level[0::2] + level[1::2]
+    mean = mean[:, 0::2] + mean[:, 1::2]
+    mean *= np.asarray(0.25, dtype=mean.dtype)
     return mean
 
 

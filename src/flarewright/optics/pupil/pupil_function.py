@@ -197,14 +197,17 @@ def _image(iris: Iris, picture: PupilImage, span: float, at: Floats, spacing: fl
 
 def _upright(pixels: NDArray[np.floating], at: Floats, spacing: float) -> Floats:
     """Return an image over [-1, 1] squared sampled as in `_image`, one axis after the other."""
-    light = np.pad(np.asarray(pixels, dtype=np.float64), 1)
+    light = np.asarray(pixels, dtype=np.float64)
     for rising in (-1.0, 1.0):
-        side = light.shape[0] - 2
+        side = light.shape[0]
         total = np.zeros((len(at), light.shape[1]))
         for shift in (-1.0, 0.0, 1.0):
+            # counted from 1, with a line of zeros at either end
             place = np.clip(0.5 * (rising * (at + shift * spacing / 3.0) + 1.0) * side + 0.5, 0.0, side + 1.0)
             low = np.minimum(place.astype(np.intp), side)
-            part = ((place - low) / 3.0)[:, None]
-            total += (1.0 / 3.0 - part) * light[low] + part * light[low + 1]
+            part = (place - low) / 3.0
+            for line, share in ((low - 1, 1.0 / 3.0 - part), (low, part)):
+                inside = (line >= 0) & (line < side)
+                total[inside] += share[inside, None] * light[line[inside]]
         light = np.ascontiguousarray(total.T)
     return light

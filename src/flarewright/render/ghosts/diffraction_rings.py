@@ -164,9 +164,9 @@ class Ringing:
         """Return the opening's amplitude and transmittance (`fresnel_grid`) at x, shape (Nx,), y, shape (Ny, 1)."""
         opening, light = self.opening, np.empty((len(y), len(x)), dtype=np.float32)
         open_softly(opening.blades, x, y[:, 0], light)
-        if opening.mask is None:
+        if opening.images is None:
             return light, light
-        wave, power = resampled(np.stack([np.sqrt(opening.mask), opening.mask]), opening.half, x, y[:, 0])
+        wave, power = (resampled(image, opening.half, x, y[:, 0]) for image in opening.images)
         return light * wave, light * power
 
     def grid(self, octaves: Octaves, shown: tuple[float, float], window: Box | None) -> FresnelGrid:

@@ -11,14 +11,16 @@ from ...model import Iris
 from ...optics.diffraction.fraunhofer import Soil
 from ...optics.pupil.dirt import generate_dirt, rasterise
 from ...optics.pupil.iris import blade_edges, iris_outline, transmission
-from ...optics.pupil.mask_levels import MaskLevels, mask_levels
-from ...typing import Floats
+from ...optics.pupil.mask_levels import MaskLevels, halved, mask_levels
+from ...typing import Floats, Pixels
 from .resolve import ResolvedProject
 
 # mask of the dirt in ghosts: pixels per side, and half its width in radii
 SOIL_SIDE, SOIL_SPAN = 1024, 1.65
 # number of straight edges that approximate a rounded iris in draft quality
 DRAFT_EDGES = 48
+# largest number of samples per side of a rotated mask
+MOST_ROTATED = 4096
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,14 @@ class Opening:
     def levels(self) -> MaskLevels | None:
         """The mask as the drawing kernels read it."""
         return None if self.mask is None else mask_levels(self.mask, self.half)
+
+    @cached_property
+    def images(self) -> tuple[Pixels, Pixels] | None:
+        """The mask's amplitude and transmittance, for the samples of diffraction."""
+        if self.mask is None:
+            return None
+        light = self.mask.astype(np.float32)
+        return np.sqrt(light), light
 
     @property
     def mean_transmittance(self) -> float:
@@ -97,8 +107,11 @@ def _rotated(mask: Floats, rotation_deg: float) -> tuple[Floats, float]:
     """Rotate a mask as `optics.pupil.iris.transmission` does; return it and its new half width in radii."""
     if rotation_deg % 90.0 == 0.0:
         return np.ascontiguousarray(np.rot90(mask, round(rotation_deg / 90.0))), 1.0
-    # resample to the square around the rotated mask, at the mask's resolution
+    # resample to the square around the rotated mask, at the mask's resolution or a half of it: pixels finer than
+    # half the samples of a ring pattern show in no picture, and take a gigabyte
     half = float(np.sqrt(2.0))
+    if half * max(mask.shape) > MOST_ROTATED:
+        mask = halved(mask)
     count = int(np.ceil(half * max(mask.shape)))
     at = ((np.arange(count) + 0.5) * 2.0 / count - 1.0) * half
     seen = transmission(Iris(rotation_deg=rotation_deg), 1.0, at, at[:, None], mask=mask)
