@@ -1,5 +1,7 @@
 """Paths with common beginnings, traced together, give the same result as each traced alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -98,3 +100,16 @@ def test_one_colour_of_a_region_holds_all_light_of_it(shot_and_paths):
             lit += int(passing.sum())
     assert lit > 1000
     assert beside > 10
+
+
+def test_a_region_beside_that_lies_outside_the_front_changes_nothing(shot_and_paths):
+    """A light of 60 degrees ended in a division by zero: the front of one side lies beside the region of the other."""
+    shot, paths = shot_and_paths
+    sought = (shot.packed, paths[3], shot.incidence.tilt, shot.opening.radius)
+    alone = find_region(*sought, one_color=True)
+    assert alone is not None
+    for place in (-500.0, 500.0):
+        beside = replace(alone, box=alone.box + place)
+        found = find_region(*sought, one_color=True, beside=beside)
+        assert found is not None
+        assert np.array_equal(found.box, alone.box)

@@ -203,8 +203,9 @@ def find_region(
     ]
     front = front_box(packed, tilt)
     finest = _finest(packed, front)
-    if beside is not None:
-        around = widened_region(packed, beside, tilt, NEAR).box
+    around = None if beside is None else widened_box(beside.box, front, NEAR)
+    # of a light far beside this one, the region can lie outside the front
+    if beside is not None and around is not None and _area(around) > 0.0:
         found, sums, _ = _scan(packed, middle, around, cells_across(packed, FINER), finest, None, 1)
         if sums[4] >= SMALL_REGION and not ((found == around) & (around != front)).any():
             return _region(found, sums, beside.slivers)
