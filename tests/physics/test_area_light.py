@@ -75,6 +75,28 @@ def _moments(pixels):
     return [float(pixels.sum()), *middle, *widths]
 
 
+def test_a_wide_light_has_as_many_parts_as_one_of_24_degrees():
+    def number(step=2.0, mode="final", **how):
+        made = resolve_project(project(light(**how), step=step, mode=mode))
+        return len(make_shots(made, make_opening(made, None)))
+
+    assert number(diameter_deg=10.0) < number(diameter_deg=20.0) < number(diameter_deg=60.0) <= 12 * 12
+    assert number(shape=Rectangle(size_deg=(60.0, 0.5))) == 12
+    assert number(shape=Rectangle(size_deg=(60.0, 0.5)), step=1.0) == 24
+    assert number(shape=Rectangle(size_deg=(60.0, 0.5)), mode="draft") == 4
+
+
+@pytest.mark.slow
+def test_parts_of_a_wide_light_are_fine_enough():
+    """Against parts half as wide, whose error is a fourth."""
+    coarse, fine = (
+        picture(project(light(diameter_deg=50.0), step=step, size=(60, 40), paths="same-side", starburst=False))
+        for step in (2.0, 1.0)
+    )
+    assert np.abs(coarse - fine).sum() < 0.005 * fine.sum()
+    assert coarse.sum() == pytest.approx(fine.sum(), rel=2e-3)
+
+
 SHAPES = {
     "sun": {"diameter_deg": 0.53},
     "disc": {"diameter_deg": 3.0},

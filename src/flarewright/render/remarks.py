@@ -16,6 +16,8 @@ from .starburst.starburst_pass import OUT_OF_FOCUS_PX
 
 BLACK = "the picture is black: no light comes through the lens to the sensor"
 HIDDEN = "the picture is black: a holdout or a depth plate hides every light"
+MANY_PARTS = 36
+"""Number of parts of area lights from which on a remark states that they take the time."""
 DARK = "the picture is black: every light has intensity 0"
 
 
@@ -51,6 +53,12 @@ def scene_remarks(settled: ResolvedProject, shots: tuple[Shot, ...]) -> tuple[st
     if settled.project.quality.mode == "draft" and ideal(settled.lens) != settled.lens:
         remarks.append("draft quality draws the lens as designed, without decentre, tilt and figure errors")
     quality = settled.project.quality
+    extended = sum(shot.border is not None for shot in shots)
+    if quality.mode == "final" and extended > MANY_PARTS:
+        remarks.append(
+            f"area lights were traced in {extended} parts, each as long as a point; "
+            "--quality draft has at most 16 a light"
+        )
     remarks += _grating_remarks(settled, shots)
     if quality.ringing == "frft" and quality.mode != "final":
         remarks.append(f"{quality.mode} quality traces rays alone: quality.ringing is for final quality")

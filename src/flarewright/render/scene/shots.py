@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import ceil
 
 import numpy as np
 
 from ...errors import ProjectError
-from ...model import Light, Project
+from ...model import Light, Project, Quality
 from ...optics.colour.spectrum import covers_all_lines, sampled_wavelengths, traced_wavelengths
 from ...optics.pupil.light_shape import parts
 from ...optics.pupil.polygon import closed
@@ -23,6 +24,11 @@ from .shot import Shot
 DRAFT_PARTS = 4
 """Largest number of parts of an area light in each direction in drafts: a ghost of matrices moves almost linearly, and
 a light of 40 degrees with four parts differs from one with twenty by 1 % of its light (mean over the picture)."""
+
+WIDEST_DIVIDED_DEG = 24.0
+"""Width of an area light up to which its parts are no wider than the step; a wider one has as many parts as this one.
+The sum of their errors is a part of the ghosts' light, and parts of a twelfth of a wide light leave 0.5 % of it, as
+parts of 2 degrees do of a narrow one; their number would grow with its square."""
 
 
 def make_shots(settled: ResolvedProject, opening: Opening, *, sampled: bool = False) -> tuple[Shot, ...]:
@@ -60,7 +66,7 @@ def make_shots(settled: ResolvedProject, opening: Opening, *, sampled: bool = Fa
             packs[key] = *between.packed_at(wavelengths_nm), between if steep else None
         of_light, bands, between_them = packs[key]
         whole = []
-        for part in parts(light, quality.source_step_deg, DRAFT_PARTS if quality.mode == "draft" else None):
+        for part in parts(light, quality.source_step_deg, most_parts(quality)):
             changes = {"field_deg": part.field_deg, "intensity": light.intensity * part.share, "holdout": None}
             point = light.replace(**changes, diameter_deg=0.0, shape=None) if light.extended else light
             seen = _seen(settled, of_light, number, point)
@@ -85,6 +91,19 @@ def make_shots(settled: ResolvedProject, opening: Opening, *, sampled: bool = Fa
             )
         shots += whole if project.holdout is None and light.holdout is None else _unhidden(settled, light, whole)
     return tuple(shots)
+
+
+def most_parts(quality: Quality) -> int | None:
+    """Return the largest number of parts of an area light in each direction; None: any.
+
+    Parameters
+    ----------
+    quality : Quality
+        Reference quality draws single directions, so its parts stay as narrow as it sets them.
+    """
+    if quality.mode == "reference":
+        return None
+    return DRAFT_PARTS if quality.mode == "draft" else ceil(WIDEST_DIVIDED_DEG / quality.source_step_deg)
 
 
 def _unhidden(settled: ResolvedProject, light: Light, whole: list[Shot]) -> list[Shot]:
