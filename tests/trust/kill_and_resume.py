@@ -236,6 +236,11 @@ TRIALS = {
         ("ghosts", "heliar-tronnier", "--light", "8,5", "--orders", "4", "--order4-limit", "1e-4", "--csv"),
         ("state/partial/*",), output=str,
     ),
+    "ghosts --glare": Trial(
+        ("ghosts", "heliar-tronnier", "--light", "8,5", "--glare", "--scatter", "harvey-shack", "--surface-roughness",
+         "2", "--json"),
+        ("state/partial/*",), output=str,
+    ),
     "ghosts --sweep": Trial(
         ("ghosts", "heliar-tronnier", "--light", "8,5", "--sweep", "field=0:20:2", "--csv"),
         ("state/partial/*",), output=str,
