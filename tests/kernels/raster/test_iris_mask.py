@@ -11,7 +11,10 @@ from flarewright.kernels.raster.iris_mask import even_value, mask_value
 from flarewright.kernels.raster.polygons import blank_plane, to_pixels
 from flarewright.kernels.raster.stop_pattern import AT_X, AT_Y, COLUMNS, FIRST, PER_MM_X, PER_MM_Y, ROWS
 from flarewright.kernels.tracing.sequential import ALIVE, STOP_X, WEIGHT, X, Y
+from flarewright.model import Iris, Light, Project
 from flarewright.optics.pupil.mask_levels import mask_levels
+from flarewright.render.scene.opening import make_opening
+from flarewright.render.scene.resolve import resolve_project
 
 SIDE = 48
 
@@ -147,3 +150,19 @@ def test_an_image_of_the_opening_stands_upright():
     assert value(image, half, 0.0, 0.0) == pytest.approx(0.45)
     assert value(image, half, 0.0, 1.0) == pytest.approx(0.7)
     assert value(image, half, 0.0, 2.5) == 0.0
+
+
+def test_a_rotated_image_of_many_pixels_is_halved_and_keeps_its_light_and_place(monkeypatch):
+    settled = resolve_project(
+        Project(lens="triplet-pestrecov", iris=Iris(rotation_deg=25.0), lights=(Light(field_deg=(5.0, 3.0)),))
+    )
+    image = np.add.outer(np.linspace(1.0, 0.0, 120), np.linspace(0.0, 0.5, 120)) / 1.5
+    whole = make_opening(settled, image)
+    monkeypatch.setattr("flarewright.render.scene.opening.MOST_ROTATED", 100)
+    halved = make_opening(settled, image)
+    assert (len(whole.mask), len(halved.mask)) == (170, 85)
+    assert halved.half == whole.half
+    assert halved.mean_transmittance == pytest.approx(whole.mean_transmittance, rel=1e-3)
+    assert 0.25 * (halved.mask[:-1, :-1] + halved.mask[1:, :-1] + halved.mask[:-1, 1:] + halved.mask[1:, 1:])[
+        20:60, 20:60
+    ] == pytest.approx(whole.mask[1:-1, 1:-1].reshape(84, 2, 84, 2).mean(axis=(1, 3))[20:60, 20:60], abs=1e-3)
