@@ -124,7 +124,7 @@ def _representative_rays(
 def _chooser(
     shot: Shot, bundle: Bundle, place: Floats, size_px: tuple[float, float], blades: Floats | None
 ) -> Callable[[int, int], NDArray[np.intp]]:
-    """Return a function that chooses so many nodes of a bundle that are seen at a wavelength, as `_visible` has it."""
+    """Return a function of wavelength and number that chooses seen nodes of a bundle; arguments as of `_visible`."""
     opening, width, height = shot.opening, float(size_px[0]), float(size_px[1])
     blades = opening.blades if blades is None else blades
     axes, places = _frames(shot, place, bundle.halves)
