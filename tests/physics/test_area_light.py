@@ -83,6 +83,8 @@ def test_a_wide_light_has_as_many_parts_as_one_of_24_degrees():
     assert number(diameter_deg=10.0) < number(diameter_deg=20.0) < number(diameter_deg=60.0) <= 12 * 12
     assert number(shape=Rectangle(size_deg=(60.0, 0.5))) == 12
     assert number(shape=Rectangle(size_deg=(60.0, 0.5)), step=1.0) == 24
+    # a large step is kept: the cap bounds the number of parts, not their width
+    assert number(shape=Rectangle(size_deg=(70.0, 50.0)), step=30.0) == 6
     assert number(shape=Rectangle(size_deg=(60.0, 0.5)), mode="draft") == 4
 
 

@@ -96,7 +96,7 @@ class Quality(Frozen):
         Draw only four-reflection paths that carry more than this fraction of the two-reflection light in the picture.
     source_step_deg : float
         Trace area lights wider than this in parts; within a part, ghosts change linearly. Lights wider than 24 degrees
-        have as many parts as one of 24.
+        have as many parts as one of 24, or 12 across.
     screen : bool
         For pictures that are only viewed (final): draw with less detail what eight bits hardly show, with still less
         as `tolerance_px` exceeds 0.5; search ghosts in the middle colour only.

@@ -25,10 +25,10 @@ DRAFT_PARTS = 4
 """Largest number of parts of an area light in each direction in drafts: a ghost of matrices moves almost linearly, and
 a light of 40 degrees with four parts differs from one with twenty by 1 % of its light (mean over the picture)."""
 
-WIDEST_DIVIDED_DEG = 24.0
-"""Width of an area light up to which its parts are no wider than the step; a wider one has as many parts as this one.
-The sum of their errors is a part of the ghosts' light, and parts of a twelfth of a wide light leave 0.5 % of it, as
-parts of 2 degrees do of a narrow one; their number would grow with its square."""
+WIDEST_DIVIDED_DEG, MOST_PARTS = 24.0, 12
+"""Parts of an area light are no wider than the step up to this width of the light, or this number of them across; a wider
+light has no more. The sum of their errors is a part of the ghosts' light, and parts of a twelfth of a wide light leave
+0.5 % of it, as parts of 2 degrees do of a narrow one; their number would grow with its square."""
 
 
 def make_shots(settled: ResolvedProject, opening: Opening, *, sampled: bool = False) -> tuple[Shot, ...]:
@@ -103,7 +103,9 @@ def most_parts(quality: Quality) -> int | None:
     """
     if quality.mode == "reference":
         return None
-    return DRAFT_PARTS if quality.mode == "draft" else ceil(WIDEST_DIVIDED_DEG / quality.source_step_deg)
+    if quality.mode == "draft":
+        return DRAFT_PARTS
+    return max(MOST_PARTS, ceil(WIDEST_DIVIDED_DEG / quality.source_step_deg))
 
 
 def _unhidden(settled: ResolvedProject, light: Light, whole: list[Shot]) -> list[Shot]:
