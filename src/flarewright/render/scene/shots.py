@@ -26,9 +26,9 @@ DRAFT_PARTS = 4
 a light of 40 degrees with four parts differs from one with twenty by 1 % of its light (mean over the picture)."""
 
 WIDEST_DIVIDED_DEG, MOST_PARTS = 24.0, 12
-"""Parts of an area light are no wider than the step up to this width of the light, or this number of them across; a wider
-light has no more. The sum of their errors is a part of the ghosts' light, and parts of a twelfth of a wide light leave
-0.5 % of it, as parts of 2 degrees do of a narrow one; their number would grow with its square."""
+"""Parts of an area light are no wider than the step up to this width of the light, or this number of them across. A
+wider light has no more. The sum of their errors is a part of the ghosts' light, and parts of a twelfth of a wide light
+leave 0.5 % of it, as parts of 2 degrees do of a narrow one; their number would grow with its square."""
 
 
 def make_shots(settled: ResolvedProject, opening: Opening, *, sampled: bool = False) -> tuple[Shot, ...]:
