@@ -61,6 +61,13 @@ def test_a_ray_passes_what_its_curve_says(name, first, second):
         # the only difference is that rays diverge with the colour
         assert reported[middle] == pytest.approx(carried[middle], rel=5e-3)
         assert np.abs(reported - carried).max() < 0.012 * carried.max()
+    # of several rays: means of every other one, without those that end and without the last of an odd number
+    ended = np.flatnonzero(rays[middle, :, ALIVE] == 0.0)
+    chosen = np.insert(np.flatnonzero(lit)[:3], 1, ended[:1])
+    both = spectra_of_rays(packed, path, TILT, curves, points[chosen], middle)
+    alone = [spectra_of_rays(packed, path, TILT, curves, points[[ray]], middle) for ray in np.flatnonzero(lit)[:2]]
+    assert both is not None
+    np.testing.assert_allclose(both.passed, [one.passed[0] for one in alone], rtol=1e-12)
 
 
 def films_of(lens, coatings):

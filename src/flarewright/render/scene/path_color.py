@@ -108,9 +108,9 @@ def _representative_rays(
     shares = light / max(light.sum(), np.finfo(np.float64).tiny)
     counts = np.where(shares < LEAST_SHARE, 0, 2 * np.ceil(0.5 * count * shares)).astype(np.int64)
     in_picture, anywhere = (pixel_frame(shot, to_pixels), shot.size_px), (np.zeros((2, 3)), (np.inf, np.inf))
-    no_blades = np.empty((0, 4))
-    for (place, size_px), blades in ((in_picture, None), (anywhere, None), (anywhere, no_blades)):
-        choose = _chooser(shot, bundle, place, size_px, blades)
+    blades, no_blades = shot.opening.blades, np.empty((0, 4))
+    for (place, size_px), edges in ((in_picture, blades), (anywhere, blades), (anywhere, no_blades)):
+        choose = _chooser(shot, bundle, place, size_px, edges)
         chosen = [(w, choose(w, n)) for w, n in zip(waves, counts.tolist(), strict=True) if n > 0]
         if found := [(w, rays) for w, rays in chosen if rays.size > 0]:
             return found
@@ -122,17 +122,19 @@ def _representative_rays(
 
 
 def _chooser(
-    shot: Shot, bundle: Bundle, place: Floats, size_px: tuple[float, float], blades: Floats | None
+    shot: Shot, bundle: Bundle, place: Floats, size_px: tuple[float, float], blades: Floats
 ) -> Callable[[int, int], NDArray[np.intp]]:
-    """Return a function of wavelength and number that chooses seen nodes of a bundle; arguments as of `_visible`."""
-    opening, width, height = shot.opening, float(size_px[0]), float(size_px[1])
-    blades = opening.blades if blades is None else blades
+    """Return a function of wavelength and number that chooses nodes of a bundle whose rays `seen_rays` finds.
+
+    They land in a picture of any size, also infinite, placed as `pixel_frame` returns it.
+    """
+    width, height = (float(side) for side in size_px)
     axes, places = _frames(shot, place, bundle.halves)
     every = _stride(bundle)
 
     def choose(wave: int, count: int) -> NDArray[np.intp]:
         nodes: NDArray[np.intp] = choose_seen(
-            bundle.traced[wave], bundle.pupil, bundle.triangles, every, opening.radius, blades, axes, places,
+            bundle.traced[wave], bundle.pupil, bundle.triangles, every, shot.opening.radius, blades, axes, places,
             width, height, count,
         )  # fmt: skip
         return nodes
@@ -193,21 +195,15 @@ def visible_rays(shot: Shot, to_pixels: Floats, halves: int) -> tuple[RayFilter,
         For the bundle and its mirror image: from the bundle's rays as in `optics.rays.bundle.trace_points`, shape
         (N, 5 + 2 C), to a mask of shape (N,).
     """
-    return _visible(shot, pixel_frame(shot, to_pixels), shot.size_px, halves)
-
-
-def _visible(
-    shot: Shot, place: Floats, size_px: tuple[float, float], halves: int, blades: Floats | None = None
-) -> tuple[RayFilter, ...]:
-    """As `visible_rays`, for a picture of any size, also infinite, with positions as in `seen_rays`, and blades."""
-    opening, width, height = shot.opening, float(size_px[0]), float(size_px[1])
-    blades = opening.blades if blades is None else blades
+    opening = shot.opening
+    width, height = (float(side) for side in shot.size_px)
 
     def seen(axes: Floats, where: Floats, rays: Floats) -> Mask:
-        mask: Mask = seen_rays(rays, opening.radius, blades, axes, where, width, height)
+        mask: Mask = seen_rays(rays, opening.radius, opening.blades, axes, where, width, height)
         return mask
 
-    return tuple(partial(seen, axes, where) for axes, where in zip(*_frames(shot, place, halves), strict=True))
+    frames = _frames(shot, pixel_frame(shot, to_pixels), halves)
+    return tuple(partial(seen, axes, where) for axes, where in zip(*frames, strict=True))
 
 
 def _frames(shot: Shot, place: Floats, halves: int) -> tuple[Floats, Floats]:
