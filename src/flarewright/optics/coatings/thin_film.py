@@ -9,9 +9,10 @@ even in delta and therefore real and smooth through the critical angle of the fi
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from flarewright.errors import FlarewrightError
 from flarewright.model.lens.coating import Bare, Coating, Film, QuarterWave, Standard
@@ -120,9 +121,9 @@ def stack_reflectance(
     docs/physics.md "Fresnel and thin films"; H. A. Macleod, Thin-Film Optical Filters, section 2.4.
     Limits are tested in tests/optics/coatings/test_thin_film.py.
     """
-    R, _ = stack_reflectance_transmittance(n_front, n_back, indices, thicknesses_nm, wavelength_nm, cos_front)
-    mean: Floats = 0.5 * (R[0] + R[1])
-    return mean
+    fields = _fields(n_front, n_back, indices, thicknesses_nm, wavelength_nm, cos_front)
+    mean: Floats = 0.5 * (_reflected(fields.s) + _reflected(fields.p))
+    return np.broadcast_to(mean, fields.shape).copy() if mean.shape != fields.shape else mean
 
 
 def stack_reflectance_transmittance(
@@ -157,33 +158,10 @@ def stack_reflectance_transmittance(
     finite. Where numerator and denominator both vanish (grazing between equal media without a film), R is its
     limit, 0.
     """
-    films = [np.asarray(a, dtype=np.float64) for a in (*indices, *thicknesses_nm)]
-    n0, nb, wave, c0, *films = np.broadcast_arrays(
-        *(np.asarray(a, dtype=np.float64) for a in (n_front, n_back, wavelength_nm, cos_front)), *films
-    )
-    films_n, films_d = films[: len(indices)], films[len(indices) :]
-    _check(n0, nb, wave, c0, films_n, films_d)
-
-    cb2 = _cos_squared(n0, nb, c0)
-    # lossless films: the sign of an imaginary cosine in the last medium does not change any modulus
-    cb = np.sqrt(cb2.astype(np.complex128))
-
-    # from the back to the front: start with (B, C) of the last medium, for p multiplied by its cosine
-    Bs, Cs = np.ones_like(cb), nb * cb
-    Bp, Cp = cb, nb.astype(np.complex128)
-    decay = np.zeros_like(c0)
-    for n, d in zip(reversed(films_n), reversed(films_d), strict=True):
-        c2 = _cos_squared(n0, n, c0)
-        kd = 2.0 * np.pi * d / wave
-        C, S, q = _cos_and_sinc(kd * kd * n * n * c2)
-        Bs, Cs = C * Bs + 1j * (S * kd) * Cs, 1j * (S * kd * n * n * c2) * Bs + C * Cs
-        Bp, Cp = C * Bp + 1j * (S * kd * c2) * Cp, 1j * (S * kd * n * n) * Bp + C * Cp
-        decay = decay + q
-
-    flux = 4.0 * n0 * c0 * nb * cb.real * np.exp(-2.0 * decay)
-    Rs, Ts = _reflect(n0 * c0 * Bs, Cs, flux)
-    Rp, Tp = _reflect(n0 * Bp, c0 * Cp, flux)
-    return np.stack([Rs, Rp]), np.stack([Ts, Tp])
+    fields = _fields(n_front, n_back, indices, thicknesses_nm, wavelength_nm, cos_front)
+    R = _reflected(fields.s), _reflected(fields.p)
+    T = _transmitted(fields.s, fields.flux), _transmitted(fields.p, fields.flux)
+    return _pair(R, fields.shape), _pair(T, fields.shape)
 
 
 def reflectance_table(
@@ -253,25 +231,119 @@ def _cos_squared(n0: Floats, n: Floats | float, c0: Floats) -> Floats:
     return ((n - n0) * (n + n0) + (n0 * c0) ** 2) / (n * n)
 
 
-def _cos_and_sinc(x: Floats) -> tuple[Floats, Floats, Floats]:
+class _Wave(NamedTuple):
+    """Real and imaginary parts of a = eta0 B and of c = C of one polarisation: r = (a - c)/(a + c)."""
+
+    a: tuple[Floats, Floats]
+    c: tuple[Floats, Floats]
+
+
+class _Fields(NamedTuple):
+    """Fields in front of a stack for s and p light.
+
+    Attributes
+    ----------
+    s, p : _Wave
+    flux : ndarray
+        4 eta0 Re(eta_sub), which T divides.
+    shape : tuple of int
+        The common shape of all arguments; the fields may have fewer axes.
+    """
+
+    s: _Wave
+    p: _Wave
+    flux: Floats
+    shape: tuple[int, ...]
+
+
+def _fields(
+    n_front: ArrayLike, n_back: ArrayLike, indices: Sequence[ArrayLike], thicknesses_nm: Sequence[ArrayLike],
+    wavelength_nm: ArrayLike, cos_front: ArrayLike,
+) -> _Fields:  # fmt: skip
+    # not broadcast to the common shape: operations on numbers cost less than on arrays of equal numbers
+    n0, nb, wave, c0, *films = (
+        np.asarray(a, dtype=np.float64) for a in (n_front, n_back, wavelength_nm, cos_front, *indices, *thicknesses_nm)
+    )
+    shape = np.broadcast_shapes(n0.shape, nb.shape, wave.shape, c0.shape, *(film.shape for film in films))
+    films_n, films_d = films[: len(indices)], films[len(indices) :]
+    _check(n0, nb, wave, c0, films_n, films_d)
+
+    cos_back = _cos_squared(n0, nb, c0)
+    # lossless films: the sign of an imaginary cosine in the last medium does not change any modulus
+    real, imaginary = np.sqrt(np.maximum(cos_back, 0.0)), np.sqrt(np.maximum(-cos_back, 0.0))
+    # from the back to the front, with the cosine q of the last medium kept apart, so that all factors are real:
+    # s: B = s[0] + i s[1] q, C = s[2] q + i s[3]; p, multiplied by q: B = p[0] q + i p[1], C = p[2] + i p[3] q
+    one, zero = np.ones(()), np.zeros(())
+    s: _Factors = (one, zero, nb, zero)
+    p = s
+    decay: Floats | float = zero
+    for n, d in zip(reversed(films_n), reversed(films_d), strict=True):
+        c2 = _cos_squared(n0, n, c0)
+        kd = 2.0 * np.pi * d / wave
+        C, S, q = _cos_and_sinc(kd * kd * n * n * c2)
+        along = S * kd
+        across = along * n * n
+        s = _through_film(s, C, along, across * c2)
+        p = _through_film(p, C, along * c2, across)
+        decay = decay + q
+    front = n0 * c0
+    return _Fields(
+        _Wave((front * (s[0] - s[1] * imaginary), front * s[1] * real), (s[2] * real, s[2] * imaginary + s[3])),
+        _Wave(
+            (n0 * p[0] * real, n0 * (p[0] * imaginary + p[1])), (c0 * (p[2] - p[3] * imaginary), c0 * p[3] * real)
+        ),
+        4.0 * front * nb * real * np.exp(-2.0 * decay),
+        shape,
+    )  # fmt: skip
+
+
+def _reflected(wave: _Wave) -> Floats:
+    """Return R = |(a - c)/(a + c)|^2, and 0 where both vanish."""
+    (a, ia), (c, ic) = wave
+    return _where_not_zero(np.square(a - c) + np.square(ia - ic), np.square(a + c) + np.square(ia + ic), 0.0)
+
+
+def _transmitted(wave: _Wave, flux: Floats) -> Floats:
+    """Return T = flux / |a + c|^2, and 1 where |a + c| vanishes."""
+    (a, ia), (c, ic) = wave
+    return _where_not_zero(flux, np.square(a + c) + np.square(ia + ic), 1.0)
+
+
+def _where_not_zero(top: Floats, bottom: Floats, otherwise: float) -> Floats:
+    """Return top / bottom, and a number where the bottom is 0."""
+    nothing = bottom == 0.0
+    if not nothing.any():
+        return top / bottom
+    return np.where(nothing, otherwise, top / np.where(nothing, 1.0, bottom))
+
+
+def _pair(values: tuple[Floats, Floats], shape: tuple[int, ...]) -> Floats:
+    """Return values of s and p light as one array of shape (2, *shape)."""
+    return np.stack([np.broadcast_to(part, shape) for part in values])
+
+
+_Factors = tuple[Floats, Floats, Floats, Floats]
+
+
+def _through_film(factors: _Factors, C: Floats, upper: Floats, lower: Floats) -> _Factors:
+    """Multiply B and C by the matrix [[C, i upper], [i lower, C]] of a film."""
+    b, ib, c, ic = factors
+    return C * b - upper * ic, C * ib + upper * c, C * c - lower * ib, C * ic + lower * b
+
+
+def _cos_and_sinc(x: Floats) -> tuple[Floats, Floats, Floats | float]:
     """Return cos(delta), sin(delta)/delta and q for x = delta^2; both are divided by e^q where x < 0.
 
     Without this scale a thick evanescent film overflows; it cancels in R and T compensates for it.
     """
     w = np.sqrt(np.abs(x))
-    fades = x < 0.0
-    q = np.where(fades, w, 0.0)
     safe = np.where(w > 0.0, w, 1.0)
-    # np.sinc is sin(pi t)/(pi t) and exact at 0
-    C = np.where(fades, 0.5 * (1.0 + np.exp(-2.0 * q)), np.cos(w))
-    S = np.where(fades, -0.5 * np.expm1(-2.0 * q) / safe, np.sinc(w / np.pi))
+    # w is 0 where `safe` is not w, and sin(0)/0 is 1
+    C, S = np.cos(w), np.where(w > 0.0, np.sin(w) / safe, 1.0)
+    fades = x < 0.0
+    if not fades.any():
+        return C, S, 0.0
+    q = np.where(fades, w, 0.0)
+    C = np.where(fades, 0.5 * (1.0 + np.exp(-2.0 * q)), C)
+    S = np.where(fades, -0.5 * np.expm1(-2.0 * q) / safe, S)
     return C, S, q
-
-
-def _reflect(a: NDArray[np.complex128], c: NDArray[np.complex128], flux: Floats) -> tuple[Floats, Floats]:
-    """Return R = |(a - c)/(a + c)|^2 and T = flux / |a + c|^2."""
-    num = np.abs(a - c) ** 2
-    den = np.abs(a + c) ** 2
-    nothing = den == 0.0
-    den = np.where(nothing, 1.0, den)
-    return np.where(nothing, 0.0, num / den), np.where(nothing, 1.0, flux / den)
