@@ -234,7 +234,7 @@ def weave(patterns, table, corners, places, light, where, beside, below, row, fi
     y, begin = row + 0.5, np.uint64(first)
     count = last + 1 - first
     # round up to whole vectors: scalar remainder loops would take longer than the extra pixels
-    padded = -(-count // TOGETHER) * TOGETHER
+    padded = -(-count // LANES) * LANES
     zero, half, one = np.float32(0.0), np.float32(0.5), np.float32(1.0)
     for m in range(padded):
         light[begin + np.uint64(m)] = one
@@ -255,20 +255,20 @@ def weave(patterns, table, corners, places, light, where, beside, below, row, fi
         if way == ON_EDGE:
             u0, u_low, u_high = u0 + half, max(u_low, zero) + half, min(u_high, longest) + half
             for m in range(padded):
-                where[np.uint64(m)] = edge + np.int32(min(max(u0 + du * np.float32(m), u_low), u_high))
+                where[np.uint64(m)] = edge + np.int32(min(max(u0 + du * np.float32(np.int32(m)), u_low), u_high))
         elif way == ROUND:
             radius, middle = np.float32(table[k, RADIUS]), np.float32(middle + half)
             for m in range(padded):
-                u = min(max(u0 + du * np.float32(m), u_low), u_high)
-                v = min(max(v0 + dv * np.float32(m), v_low), v_high)
+                u = min(max(u0 + du * np.float32(np.int32(m)), u_low), u_high)
+                v = min(max(v0 + dv * np.float32(np.int32(m)), v_low), v_high)
                 at = (sqrt(u * u + v * v) - radius) * edge_per_mm + middle
                 where[np.uint64(m)] = edge + np.int32(min(max(at, half), longest + half))
         elif way == PICTURE:
             per_x, per_y = np.float32(table[k, PER_MM_X]), np.float32(table[k, PER_MM_Y])
             at_x, at_y = np.float32(table[k, AT_X]), np.float32(table[k, AT_Y])
             for m in range(padded):
-                u = min(max(u0 + du * np.float32(m), u_low), u_high)
-                v = min(max(v0 + dv * np.float32(m), v_low), v_high)
+                u = min(max(u0 + du * np.float32(np.int32(m)), u_low), u_high)
+                v = min(max(v0 + dv * np.float32(np.int32(m)), v_low), v_high)
                 column = min(max(u * per_x + at_x, zero), last_column)
                 line = min(max(v * per_y + at_y, zero), last_row)
                 c, r = np.int32(column), np.int32(line)
@@ -284,8 +284,8 @@ def weave(patterns, table, corners, places, light, where, beside, below, row, fi
             curved = radius > zero
             across = np.float32(columns)
             for m in range(-(-count // LANES) * LANES):
-                p = min(max(u0 + du * np.float32(m), u_low), u_high)
-                q = abs(min(max(v0 + dv * np.float32(m), v_low), v_high))
+                p = min(max(u0 + du * np.float32(np.int32(m)), u_low), u_high)
+                q = abs(min(max(v0 + dv * np.float32(np.int32(m)), v_low), v_high))
                 # by symmetry fold both ends of the blade onto one corner
                 u, v = p * cosine + q * sine, abs(q * cosine - p * sine)
                 beyond, other = u * cosine + v * sine - offset, u * cosine - v * sine - offset
@@ -303,8 +303,8 @@ def weave(patterns, table, corners, places, light, where, beside, below, row, fi
                 below[np.uint64(m)] = line - cells if near else zero
         else:
             for m in range(count):
-                u = min(max(u0 + du * np.float32(m), u_low), u_high)
-                v = min(max(v0 + dv * np.float32(m), v_low), v_high)
+                u = min(max(u0 + du * np.float32(np.int32(m)), u_low), u_high)
+                v = min(max(v0 + dv * np.float32(np.int32(m)), v_low), v_high)
                 # float64 as at the other calls, so that only one version is compiled
                 light[begin + np.uint64(m)] *= pattern_value(patterns, table, corners, k, np.float64(u), np.float64(v))
         if way in (ON_EDGE, ROUND):
