@@ -37,9 +37,6 @@ OPEN, ON_EDGE, ALONG_BLADE, ROUND, PICTURE, ANYWHERE = 0, 1, 2, 3, 4, 5
 U, V, U_LOW, U_HIGH, V_LOW, V_HIGH, WAY = 0, 3, 6, 7, 8, 9, 10
 PLACE_COLUMNS = 11
 
-# pixels looked up in one vectorised step; rows of light are longer than the picture by this number
-TOGETHER = 16
-
 
 @inlined
 def nearest_corner(table, corners, k, x, y):
@@ -196,7 +193,8 @@ def _near_corner(table, corners, k, blade, stops, count):
 @inner
 def room_to_weave(crossings, width):
     """Return zeroed arrays `places`, `light`, `where`, `beside` and `below` for `weave`, for a picture of a width."""
-    wide = width + TOGETHER
+    # `weave` rounds up to whole vectors
+    wide = width + LANES
     places = np.empty((crossings, PLACE_COLUMNS))
     light, where = np.empty(wide, dtype=np.float32), np.empty(wide, dtype=np.int32)
     beside, below = np.empty(wide, dtype=np.float32), np.empty(wide, dtype=np.float32)
@@ -220,7 +218,7 @@ def weave(patterns, table, corners, places, light, where, beside, below, row, fi
     places : ndarray, shape (C, PLACE_COLUMNS)
         Places of the polygon.
     light : ndarray, float32
-        By column; filled, and up to TOGETHER columns further.
+        By column; filled, and up to LANES - 1 columns further.
     where, beside, below : ndarray
         Scratch: indices in `patterns`, int32, and fractions of a sample towards the next column and the next row,
         float32.
