@@ -305,7 +305,7 @@ def test_search_finds_where_the_lamp_leaves_the_view():
     assert found.veils_cd_m2[found.best] < 0.9 * found.veils_cd_m2[0]
     # within a tenth of the best on a fine grid over the disc
     grid = [(x, y) for x in np.linspace(-3.0, 3.0, 25) for y in np.linspace(-3.0, 3.0, 25) if np.hypot(x, y) <= 3.0]
-    flare = painted()
+    flare = painted(100)
     least = min(
         plan_scene(
             scene([camera(position_m=(x, y, 0.0))], [lamp(position_m=(4.0, 10.0, 0.0))]),
