@@ -499,21 +499,33 @@ def refuse(capsys, folder, words, *keywords):
     return out
 
 
-@pytest.mark.parametrize("case", LENS_FILES)
-def test_lens_files(capsys, folder, case):
+def checked_and_rendered(cases):
+    """Return each case with both commands. A render reads the file as the check does: most of them are slow tests."""
+    checked = [pytest.param(case, "check", id=case) for case in cases]
+    rendered = [
+        pytest.param(case, "render", id=f"{case}, rendered", marks=[pytest.mark.slow] if number % 6 else [])
+        for number, case in enumerate(cases)
+    ]
+    return [*checked, *rendered]
+
+
+@pytest.mark.parametrize(("case", "command"), checked_and_rendered(LENS_FILES))
+def test_lens_files(capsys, folder, case, command):
     text, keyword = LENS_FILES[case]
     (folder / "bad.toml").write_text(text)
-    out = refuse(capsys, folder, ["lens", "check", "bad.toml"], keyword)
-    assert out.startswith("bad.toml: rejected")
-    assert refuse(capsys, folder, ["render", "bad.toml", "--light", "1,1", "-o", "a.exr"], keyword) == ""
+    if command == "check":
+        out = refuse(capsys, folder, ["lens", "check", "bad.toml"], keyword)
+        assert out.startswith("bad.toml: rejected")
+    else:
+        assert refuse(capsys, folder, ["render", "bad.toml", "--light", "1,1", "-o", "a.exr"], keyword) == ""
 
 
-@pytest.mark.parametrize("case", PROJECT_FILES)
-def test_project_files(capsys, folder, case):
+@pytest.mark.parametrize(("case", "command"), checked_and_rendered(PROJECT_FILES))
+def test_project_files(capsys, folder, case, command):
     text, keyword = PROJECT_FILES[case]
     (folder / "bad.toml").write_text(text)
-    assert refuse(capsys, folder, ["project", "check", "bad.toml"], keyword) == ""
-    assert refuse(capsys, folder, ["render", "--project", "bad.toml", "-o", "a.exr"], keyword) == ""
+    words = {"check": "project check bad.toml", "render": "render --project bad.toml -o a.exr"}[command]
+    assert refuse(capsys, folder, words.split(), keyword) == ""
 
 
 @pytest.mark.parametrize("case", COMMAND_LINES)

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from functools import cache
 
 import pytest
 from typer.main import get_command
@@ -9,7 +10,8 @@ from typer.main import get_command
 from flarewright.cli.command_tree import COMMANDS, GROUPS, command_tree
 
 
-def names(words=()):
+@cache
+def names(*words):
     """Return the names of all commands and groups of the tree of a command line, with those below them."""
     tree = get_command(command_tree(words))
     return {(name, *getattr(command, "commands", {})) for name, command in tree.commands.items()}
@@ -23,13 +25,13 @@ def test_every_command_is_in_the_tree_once():
 
 @pytest.mark.parametrize("words", [["render", "--help"], ["design", "sovle"], ["looks"], ["project", "check"]])
 def test_the_tree_of_a_command_line_is_a_part_of_the_whole(words):
-    assert names(words) == {name for name in names() if name[0] == words[0]}
+    assert names(*words) == {name for name in names() if name[0] == words[0]}
 
 
-@pytest.mark.parametrize("words", [[], ["--version"], ["rendr"]])
+@pytest.mark.parametrize("words", [["--version"], ["rendr"]])
 def test_any_other_command_line_has_all_commands(words):
     """So that the error names the command that is meant."""
-    assert names(words) == names()
+    assert names(*words) == names()
 
 
 def test_a_render_imports_no_other_command():

@@ -95,8 +95,8 @@ def test_half_floats_clip_no_light_however_bright(capsys, folder, intensity):
 
 
 def test_a_light_s_path_through_the_picture_leaves_the_scale(folder):
-    scales = []
+    scales, words = [], ["--light", "-3,4", "--intensity", "100000", "--layers", "ghosts", "--paths", "same-side"]
     for place in ("0,0", "10,5"):
-        assert run([*SMALL, "--light", place, "--light", "-3,4", "--intensity", "100000", "--layers", "ghosts"]) == 0
+        assert run([*SMALL, "--light", place, *words]) == 0
         scales.append(read_exr("a.exr").scale)
     assert scales == [2.0**-7] * 2

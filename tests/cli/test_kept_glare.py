@@ -7,7 +7,8 @@ import json
 from flarewright.cli.app import run
 from flarewright.render.scattering import veiling_glare
 
-COMMAND = ["ghosts", "triplet-pestrecov", "--light", "5,0", "--paths", "same-side", "--glare", "--scatter", "abg"]
+COMMAND = ["ghosts", "triplet-pestrecov", "--light", "5,0", "--fstop", "16", "--paths", "same-side"]
+COMMAND += ["--glare", "--scatter", "abg"]
 
 
 def test_the_glare_resumes_to_the_same_number(tmp_path, monkeypatch, capsys):

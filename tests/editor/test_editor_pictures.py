@@ -933,13 +933,13 @@ def test_a_look_is_exposed_anew_and_undone_with_its_exposure():
     screen.start()
     assert screen.wait(60.0)
     held = screen.exposure_stops
-    session.do("put_look", {"name": "warm-vintage"})
+    session.do("put_look", {"name": "uncoated-thirties"})
     assert screen.wait(60.0)
     worn = screen.exposure_stops
     assert worn == session.view.found_stops == render_picture.exposure_of(screen.picture)
     assert abs(worn - held) > 1.0
     # edits keep the exposure of the look
-    session.do("set_coating", {"text": "none"})
+    session.do("set_coating", {"text": "modern-broadband"})
     assert screen.wait(60.0)
     assert screen.exposure_stops == worn
     session.undo()

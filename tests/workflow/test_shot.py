@@ -72,7 +72,7 @@ def test_a_frame_is_what_render_draws_at_its_time(whole):
     assert len(found.layers) == len(drawn.layers) == 5
     for layer, other in zip(found.layers[:2], drawn.layers, strict=False):
         # half floats have 11 bits
-        assert layer.pixels == pytest.approx(other.pixels, rel=2**-11, abs=1e-9)
+        np.testing.assert_allclose(layer.pixels, other.pixels, rtol=2**-11, atol=0)
 
 
 def sent_around(function, context, items, *, processes, threads, what, executor):
@@ -284,7 +284,7 @@ def test_the_project_in_a_frame_draws_it_again(whole, tmp_path):
     found = read_exr(whole / "f.0005.exr")
     file.write_text(found.metadata["project"])
     again = render(read_project(file)).layers[0].pixels
-    assert found.layers[0].pixels == pytest.approx(again, rel=2**-11, abs=1e-9)
+    np.testing.assert_allclose(found.layers[0].pixels, again, rtol=2**-11, atol=0)
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Linux")

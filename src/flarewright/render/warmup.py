@@ -40,10 +40,10 @@ def compile_for_render(
         The project cannot be rendered; raised before anything is compiled.
     """
     names = needed(traits(project))
-    if not absent(names):
-        return
     # a helper process leaves compiling to its first calls
-    if report is not None and not is_helper():
+    if is_helper() or not absent(names):
+        return
+    if report is not None:
         report(FIRST)
     compile_together(names, min(threads or cores(), cores()), shown)
 

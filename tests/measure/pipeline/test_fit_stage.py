@@ -191,13 +191,13 @@ def test_only_every_nth_constellation_of_each_roll_is_read(tmp_path, every, kept
 
 def test_the_effect_of_corrections_is_reported(folder, tmp_path, capsys):
     path = tmp_path / "corrections.json"
-    along = np.tan(np.radians(ANGLES[6])) / np.tan(np.radians(LARGEST))
+    along = np.tan(np.radians(ANGLES[4])) / np.tan(np.radians(LARGEST))
     there, nowhere = (
-        {"constellation_deg": ANGLES[6], "centre_px": [AXIS[0] + speed * along, AXIS[1]], "radius_px": RADIUS}
+        {"constellation_deg": ANGLES[4], "centre_px": [AXIS[0] + speed * along, AXIS[1]], "radius_px": RADIUS}
         for speed in (SPEED, -45.0)
     )
     path.write_text(json.dumps({"add": [there, nowhere], "remove": ["77"]}))
-    assert command(["measure", "find", str(folder), "--every", "2", "--corrections", str(path)]) == 0
+    assert command(["measure", "find", str(folder), "--every", "4", "--corrections", str(path)]) == 0
     reported = capsys.readouterr().err
     assert "is ghost 1" in reported
     assert "mark ignored" in reported

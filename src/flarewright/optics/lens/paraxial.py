@@ -185,8 +185,8 @@ def first_order(
     number = lens.f_number if f_number is None else f_number
     pupil = efl / number
     (sa, sb), _ = to_stop
-    _, rear = flare_matrices(lens, direct_path(lens), wavelength_nm, last)
-    exit_diameter, exit_z = _exit_pupil(rear, abs(sa) * pupil)
+    # as `flare_matrices`, from the matrices that are known
+    exit_diameter, exit_z = _exit_pupil(system @ np.linalg.inv(to_stop), abs(sa) * pupil)
     return FirstOrder(
         efl=float(efl),
         bfl=float(bfl),
