@@ -70,8 +70,8 @@ def vertex_positions(lens: Lens) -> Floats:
 
 
 def gap_indices(lens: Lens, wavelength_nm: float) -> Floats:
-    """Return the index before row 0 and behind every row, shape (K + 1,)."""
-    return np.array(_in_gaps(lens, 1.0, lambda medium: _index(medium, wavelength_nm)))
+    """Return the index before row 0 and behind every row, shape (K + 1,); shared, therefore read-only."""
+    return _LAST.indices(lens, wavelength_nm)
 
 
 def gap_indices_at(lens: Lens, wavelengths_nm: Floats) -> Floats:
@@ -92,6 +92,30 @@ def _in_gaps(lens: Lens, air: _Index, index: Callable[[Medium | None], _Index]) 
 @lru_cache(maxsize=4096)
 def _index(medium: Medium | None, wavelength_nm: float) -> float:
     return float(refractive_index(medium, wavelength_nm))
+
+
+class _LastLens:
+    """The indices of the lens that was asked last: matrices of many paths want the same ones."""
+
+    _MOST = 256
+
+    def __init__(self) -> None:
+        # one tuple, so that threads see a lens only with its own indices
+        self._held: tuple[Lens | None, dict[float, Floats]] = None, {}
+
+    def indices(self, lens: Lens, wavelength_nm: float) -> Floats:
+        held, found = self._held
+        if held is not lens or len(found) > self._MOST:
+            self._held = _, found = lens, {}
+        indices = found.get(wavelength_nm)
+        if indices is None:
+            indices = np.array(_in_gaps(lens, 1.0, lambda medium: _index(medium, wavelength_nm)))
+            indices.setflags(write=False)
+            found[wavelength_nm] = indices
+        return indices
+
+
+_LAST = _LastLens()
 
 
 def path_matrices(

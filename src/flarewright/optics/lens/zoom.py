@@ -161,11 +161,9 @@ def _between(lens: Lens, focal_length: float, distance: float | None) -> Positio
 
 
 def _part(lens: Lens, one: Position, other: Position, focal_length: float) -> float:
-    """Return by bisection the fraction between two positions that has a focal length."""
-    low, high = 0.0, 1.0
-    part = 0.0
-    for _ in range(STEPS):
-        part = 0.5 * (low + high)
+    """Return the fraction between two positions that has a focal length, by the Illinois method."""
+
+    def error(part: float) -> float:
         try:
             efl = first_order(at_position(lens, _interpolated_position(lens, one, other, part))).efl
         except LensError:
@@ -173,9 +171,26 @@ def _part(lens: Lens, one: Position, other: Position, focal_length: float) -> fl
                 f"{lens.name} forms no image on the straight path between its positions {one.name!r} and "
                 f"{other.name!r}; choose one of them by its name"
             ) from None
-        if abs(efl / focal_length - 1.0) < CLOSE:
+        return efl / focal_length - 1.0
+
+    low, high = 0.0, 1.0
+    below, above = error(low), error(high)
+    for end, found in ((low, below), (high, above)):
+        if abs(found) < CLOSE:
+            return end
+    part, side = low, 0
+    for _ in range(STEPS):
+        part = low - below * (high - low) / (above - below)
+        found = error(part)
+        if abs(found) < CLOSE:
             break
-        low, high = (part, high) if efl < focal_length else (low, part)
+        # an end that stays twice counts half: otherwise it would stay for ever
+        if found < 0.0:
+            low, below, above = part, found, 0.5 * above if side < 0 else above
+            side = -1
+        else:
+            high, above, below = part, found, 0.5 * below if side > 0 else below
+            side = 1
     return part
 
 
