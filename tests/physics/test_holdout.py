@@ -28,7 +28,7 @@ D_LINE = Lines(lines=((587.56, 1.0),))
 SIZE = (120, 80)
 FINE = 8
 # half of the ghosts suffice to test holdouts
-SOME = {"paths": "same-side"}
+SOME = {"paths": "same-side", "source_step_deg": 2.0}
 QUALITIES = [SOME, pytest.param({}, marks=pytest.mark.slow)]
 DISC = Light(field_deg=(6.0, 4.0), spectrum=D_LINE, diameter_deg=3.0)
 
