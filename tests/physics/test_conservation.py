@@ -90,7 +90,7 @@ def test_a_surface_that_is_none_changes_nothing(at, part, f_number):
 
 
 @pytest.mark.parametrize("f_number", OPENINGS)
-@pytest.mark.parametrize("prescription", [HELIAR, pytest.param(TRIPLET, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("prescription", [TRIPLET, pytest.param(HELIAR, marks=pytest.mark.slow)])
 def test_mirrored_light_mirrors_the_table(prescription, f_number):
     a_lens = lens(prescription, f_number)
     table = heliar_table(f_number) if prescription is HELIAR else ghost_table_of(a_lens, FIELD)
@@ -109,14 +109,15 @@ def test_mirrored_light_mirrors_the_table(prescription, f_number):
 @pytest.mark.parametrize(
     "azimuth_deg", [pytest.param(30.0, marks=pytest.mark.slow), pytest.param(90.0, marks=pytest.mark.slow), 211.0]
 )
-def test_turning_the_light_turns_the_ghosts(azimuth_deg, f_number):
+@pytest.mark.parametrize("prescription", [TRIPLET, pytest.param(HELIAR, marks=pytest.mark.slow)])
+def test_turning_the_light_turns_the_ghosts(prescription, azimuth_deg, f_number):
     """A round lens has no preferred azimuth: flux and size are constant, centroids rotate with the light."""
-    a_lens = lens(HELIAR, f_number)
+    a_lens = lens(prescription, f_number)
     slope = np.tan(np.radians(9.0))
     phi = np.radians(azimuth_deg)
     field = tuple(np.degrees(np.arctan(slope * np.array([np.cos(phi), np.sin(phi)]))).tolist())
     b = by_path(ghost_table_of(a_lens, field))
-    for path, g in carrying(heliar_table(f_number, (9.0, 0.0))).items():
+    for path, g in carrying(ghost_table_of(a_lens, (9.0, 0.0))).items():
         h = b[path]
         x, y = g.centroid_mm
         assert y == pytest.approx(0.0, abs=1e-5 * g.rms_radius_mm)

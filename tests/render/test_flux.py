@@ -11,7 +11,7 @@ from PIL import Image
 from prescriptions import ghost_table_of
 from pupil_sum import D_LINE, by_name, count, layer_flux, layers_of, mono, path_of, picture, scene, shots_of
 
-from flarewright.model import D65, Everywhere, Iris, Light, Output, Project, Quality, QuarterWave
+from flarewright.model import D65, Art, Everywhere, Iris, Light, Output, Project, Quality, QuarterWave, Rule
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.optics.rays.pupil_region import find_region
 from flarewright.render.ghosts.ghost_pass import render_ghosts
@@ -121,7 +121,8 @@ def test_each_layer_holds_its_flux_behind_blades():
 @pytest.mark.parametrize(
     ("lens", "iris", "f_number", "field", "size", "sensor"),
     [
-        ("heliar-tronnier", SIX, 8.0, (8.0, 5.0), (64, 36), (360.0, 202.5)),
+        ("triplet-pestrecov", SIX, 8.0, (8.0, 5.0), (64, 36), (360.0, 202.5)),
+        slow("heliar-tronnier", SIX, 8.0, (8.0, 5.0), (64, 36), (360.0, 202.5)),
         slow("tessar-brendel", ROUNDED_FIVE, 8.0, (8.0, 5.0), (320, 180), (360.0, 202.5)),
         slow("double-gauss-tronnier", ROUNDED_FIVE, 8.0, (-14.0, 3.0), (101, 99), (100.0, 100.0)),
         slow("tessar-brendel", ROUND, 8.0, (8.0, 5.0), (160, 90), HOLDS),
@@ -149,13 +150,16 @@ def test_every_edge_is_cut_exactly(lens, iris, f_number, field, size, sensor):
 def test_light_beside_rays_that_end_is_drawn(lens, field, f_number, rays, every):
     """Ghosts bounded by rays that miss a surface, before which T falls steeply, instead of by an edge."""
     project = ghosts_of(lens, mono(field), f_number=f_number, size_px=(120, 80), sensor_mm=HOLDS)
-    assert complaints(project, counted(project, rays, every)) == []
+    truth = counted(project, rays, every)
+    others = Rule(select="not " + ",".join(name.removeprefix("ghost.") for name in truth), enable=False)
+    assert complaints(project.replace(art=Art(rules=(others,))), truth) == []
 
 
 @pytest.mark.parametrize(
     ("lens", "field", "f_number"),
     [
-        ("heliar-tronnier", (8.0, 5.0), 8.0),
+        ("triplet-pestrecov", (8.0, 5.0), 8.0),
+        slow("heliar-tronnier", (8.0, 5.0), 8.0),
         slow("double-gauss-tronnier", (8.0, 5.0), 8.0),
         slow("takumar-50-f1.4", (8.0, 5.0), 1.4),
     ],
@@ -172,7 +176,7 @@ def test_layers_agree_with_the_ghost_table(lens, field, f_number):
 
 
 @pytest.mark.parametrize("mode", ["passes", "ghosts"])
-@pytest.mark.parametrize("lens", ["heliar-tronnier", slow("tessar-brendel")])
+@pytest.mark.parametrize("lens", ["triplet-pestrecov", slow("heliar-tronnier"), slow("tessar-brendel")])
 def test_the_pass_holds_all_ghosts(lens, mode):
     """Drawn together, with faint ghosts at lower resolution, or one by one."""
     project = scene(lens, mono((8.0, 5.0)), layers=mode, starburst=False, size_px=(160, 90), sensor_mm=(72.0, 40.5))
@@ -217,6 +221,7 @@ def test_colours_hold_the_flux_of_every_wavelength(bridge, waves):
 def test_few_wavelengths_tell_the_colours_of_single_films(mode, limit):
     """The reflectance of a film is near 0 at 550 nm and curved there; linear interpolation would miss that."""
     parts = {"layers": "passes", "starburst": False, "mode": mode, "size_px": (96, 54), "sensor_mm": (72.0, 40.5)}
+    parts["paths"] = "same-side"
     film = Everywhere(coating=QuarterWave(center_wavelength_nm=550.0))
     found = {}
     for waves, bridge in ((21, False), (7, False), (7, True)):

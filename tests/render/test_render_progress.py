@@ -2,6 +2,7 @@
 
 from flarewright.model import Camera, Light, Project, Quality, Scatter
 from flarewright.render.render import render
+from flarewright.render.scattering import scatter_pass
 
 PROJECT = Project(
     lens="triplet-pestrecov", lights=(Light(field_deg=(9.0, 4.0)),), f_number=8.0, camera=Camera(size_px=(32, 18)),
@@ -9,7 +10,10 @@ PROJECT = Project(
 )  # fmt: skip
 
 
-def test_progress_rises_through_the_passes_to_the_end():
+def test_progress_rises_through_the_passes_to_the_end(monkeypatch):
+    # scatter at few points from few rays
+    few = scatter_pass.FINE._replace(rays=6, rings=12, spokes=12, fan=8)
+    monkeypatch.setattr(scatter_pass, "FINE", few)
     seen = []
     render(PROJECT, progress=lambda part, words: seen.append((part, words)))
     parts, words = zip(*seen, strict=True)

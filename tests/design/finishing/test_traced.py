@@ -100,6 +100,8 @@ def test_a_lens_is_finished_where_first_order_ends():
 @pytest.mark.parametrize("steps", [1, pytest.param(STEPS, marks=pytest.mark.slow)])
 def test_final_quality_makes_lenses_whose_traced_ghosts_are_nearer(monkeypatch, steps):
     monkeypatch.setattr("flarewright.design.finishing.traced_polish.STEPS", steps)
+    # the fewest lenses whose rays are traced
+    monkeypatch.setattr("flarewright.design.finishing.candidate.TRACED", 1)
     ghost_targets = (GhostTarget(ghost="2-1", height=1.2),)
     design = Design(ghost_targets=ghost_targets, quality="final", structure="lens")
     project = Project(lens="triplet-pestrecov", f_number=8.0, lights=(Light(field_deg=(10.0, 5.0)),), design=design)

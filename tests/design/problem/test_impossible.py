@@ -107,9 +107,10 @@ def test_targets_at_two_lights_that_no_ghost_can_meet():
     assert "4-1" in obstacle.target
     assert "lights 0 and 1" in obstacle.reason
     # the found lens misses by no less, is called impossible, and every ghost's error is reported
-    found = outcomes(solve(problem, time_limit=None, most_searches=60), problem, count=1)
+    state = solve(problem, time_limit=None, most_searches=60)
+    found = outcomes(state, problem, count=1)
     assert np.abs(found[0].residuals).max() >= obstacle.least_error_mm
-    reported = search_summary(solve(problem, time_limit=None, most_searches=60), found, problem, (obstacle,))
+    reported = search_summary(state, found, problem, (obstacle,))
     assert reported["verdict"] == "impossible"
     assert len(reported["lenses"][0]["ghosts"]) == len(problem.objective.targets)
     assert verdict(found[0]) != "impossible"

@@ -78,21 +78,24 @@ def test_a_cover_glass_moves_the_focus_back_by_its_part(heliar):
     assert stated.rows[-3].thickness == pytest.approx(90.0 - 2.5)
 
 
-def test_the_sensor_mirrors_its_image_back_onto_itself(heliar):
+def test_the_sensor_mirrors_its_image_back_onto_itself():
+    # fewer ghosts than those of the Heliar
+    triplet = load_lens("triplet-pestrecov")
+
     def shot(**more):
-        return ghosts(heliar, FIELD, coating=Everywhere(coating=Bare()), f_number=16.0, cover_glass=GLASS, **more)
+        return ghosts(triplet, FIELD, coating=Everywhere(coating=Bare()), f_number=16.0, cover_glass=GLASS, **more)
 
     dull, bright, brighter = shot(), shot(sensor_reflectance=0.05), shot(sensor_reflectance=0.1)
     assert not any("sensor" in name for name in named(dull))
     mirrored = {name: row for name, row in named(bright).items() if name.startswith("sensor-")}
-    assert len(mirrored) == sum(isinstance(row, Surface) for row in heliar.rows) + 2
+    assert len(mirrored) == sum(isinstance(row, Surface) for row in triplet.rows) + 2
     # all other rows are unchanged
     for name, row in named(dull).items():
         assert named(bright)[name] == row
     for name, row in mirrored.items():
         assert named(brighter)[name].throughput_mm2 == pytest.approx(2.0 * row.throughput_mm2, rel=1e-9)
     # between the sensor and the glass' rear face: 0.05 of the light, 0.04 of that; its focus is twice the gap ahead
-    rear, front = mirrored["sensor-10"], mirrored["sensor-9"]
+    rear, front = mirrored["sensor-8"], mirrored["sensor-7"]
     assert rear.throughput_mm2 == pytest.approx(bright.direct.throughput_mm2 * 0.05 * FRESNEL, rel=2e-3)
     assert rear.focus_distance_mm == pytest.approx(-2.0 * GLASS.gap, abs=1e-6)
     assert front.focus_distance_mm == pytest.approx(-2.0 * (GLASS.gap + GLASS.thickness / 1.5), abs=1e-6)

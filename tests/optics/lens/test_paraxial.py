@@ -74,6 +74,12 @@ def test_shipped_lenses_have_the_known_focal_length(name, efl, digits):
 # --- flare matrices
 
 
+def some_paths(a_lens):
+    """Return all ghosts of a prime, and every fifth of a zoom's 351."""
+    paths = ghost_paths(a_lens)
+    return paths[:: 1 if len(paths) < 100 else 5]
+
+
 @pytest.mark.parametrize("path", HELIAR_GHOSTS)
 def test_flare_matrices_of_the_heliar(path):
     a_lens = lens(HELIAR, 4.5)
@@ -86,7 +92,7 @@ def test_flare_matrices_of_the_heliar(path):
 def test_determinants_are_the_ratio_of_the_indices(table, f_number):
     """n_in / n_out of each part: air in front and behind, so 1 at the stop and at the sensor, on every path."""
     a_lens = lens(table, f_number)
-    for path in (direct_path(a_lens), *ghost_paths(a_lens)):
+    for path in (direct_path(a_lens), *some_paths(a_lens)):
         to_stop, total = path_matrices(a_lens, path, D_LINE_NM, sensor_plane(a_lens))
         assert len(to_stop) == path.stop_crossings
         # entries reach 1e4, so their products cancel at 1e-8
@@ -140,7 +146,7 @@ def plain_matrices(a_lens: Lens, j: int, i: int, sensor_z: float) -> np.ndarray:
 def test_flare_matrices_are_the_textbook_product(table, f_number):
     a_lens = lens(table, f_number)
     plane = sensor_plane(a_lens)
-    for path in ghost_paths(a_lens):
+    for path in some_paths(a_lens):
         _, total = path_matrices(a_lens, path, D_LINE_NM, plane)
         expected = plain_matrices(a_lens, path.first_reflection, path.second_reflection, plane)
         np.testing.assert_allclose(total, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())

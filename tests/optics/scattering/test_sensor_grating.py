@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -103,8 +105,13 @@ def picture(rendering, name):
     return whole
 
 
+@cache
+def plain_mirror():
+    return render(frame(None))
+
+
 def test_a_picture_shows_orders_where_the_equation_puts_them():
-    mirrored, diffracted = render(frame(None)), render(frame(4.0))
+    mirrored, diffracted = plain_mirror(), render(frame(4.0))
     # from the back of the cover glass
     name = "ghost.sensor-10"
     plain, orders = picture(mirrored, name), picture(diffracted, name)
@@ -122,7 +129,7 @@ def test_a_picture_shows_orders_where_the_equation_puts_them():
 
 
 def test_an_even_mirror_is_a_grating_without_dark_fields():
-    mirrored, even = render(frame(None)), render(frame(8.0, fill=1.0))
+    mirrored, even = plain_mirror(), render(frame(8.0, fill=1.0))
     for a, b in zip(mirrored.layers, even.layers, strict=True):
         # pytest.approx compares pixels one by one, which is slow
         assert b.pixels.shape == a.pixels.shape

@@ -56,7 +56,7 @@ def test_a_render_of_cyan_light_without_negative_channels():
     """Passes still add up to the beauty; without compression, every lit pixel of a spectral cyan is negative."""
     project = Project(
         lens="triplet-pestrecov", lights=(Light(field_deg=(8.0, 4.0), spectrum=CYAN),), camera=Camera(size_px=(64, 36)),
-        quality=Quality(ringing="off"), output=Output(layers="passes", gamut="compress"),
+        quality=Quality(ringing="off", paths="same-side"), output=Output(layers="passes", gamut="compress"),
     )  # fmt: skip
     whole, *passes = render(project).layers
     assert all(each.pixels.min() >= 0.0 for each in (whole, *passes))

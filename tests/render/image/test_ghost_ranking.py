@@ -8,6 +8,7 @@ from flarewright.errors import ProjectError
 from flarewright.model import Scatter
 from flarewright.optics.colour.rgb import luminance_weights
 from flarewright.render.image.ghost_ranking import GhostRanking, rank_remarks
+from flarewright.render.scattering import scatter_pass
 
 SIZE = (64, 36)
 
@@ -105,7 +106,9 @@ def test_few_ranks_keep_the_brightest_and_no_layers(monkeypatch):
     assert any("2 ghosts a pixel" in remark and "--matte-ranks" in remark for remark in drawn.remarks)
 
 
-def test_scatter_is_an_object_among_the_ghosts():
+def test_scatter_is_an_object_among_the_ghosts(monkeypatch):
+    # scatter at few points from few rays
+    monkeypatch.setattr(scatter_pass, "FINE", scatter_pass.FINE._replace(rays=6, rings=12, spokes=12, fan=8))
     of_all = project(matte="ghosts", matte_ranks=16).replace(scatter=Scatter(model="harvey-shack"))
     drawn = render(of_all)
     scatter = next(layer for layer in drawn.layers if layer.name == "scatter")

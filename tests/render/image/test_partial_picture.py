@@ -26,7 +26,7 @@ FOURS = PROJECT.replace(
     camera=Camera(size_px=(32, 18)),
 )
 CASES = {
-    "points": PROJECT.replace(quality=Quality(wavelengths=2)),
+    "points": PROJECT.replace(quality=Quality(wavelengths=2, paths="same-side")),
     "disc": PROJECT.replace(lights=(Light(field_deg=(9.0, 4.0), diameter_deg=0.5), POINTS[1])),
     "layers": PROJECT.replace(output=Output(layers="ghosts", brightest=3, starburst=False)),
     "art": PROJECT.replace(art=Art(rules=(Rule(select="all", blur_mm=0.3), Rule(select="2-1", blur_mm=0.2)))),

@@ -91,7 +91,10 @@ def rough_standard():
 
 @pytest.fixture(scope="module")
 def by_chance():
-    return render(project(quality=BY_CHANCE), ledger=True)
+    # a ledger is unbiased for any number of rays
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(energy_ledger, "SIDE", 32)
+        return render(project(quality=BY_CHANCE), ledger=True)
 
 
 def test_nothing_scatters_by_default(plain, few_points):
@@ -269,7 +272,6 @@ def test_the_reference_scatters_by_chance_and_the_ledger_shows_it(by_chance, sta
     ]  # fmt: skip
     mine = luminance(standard[0]).sum()
     assert luminance(layer(found, "scatter")).sum() == pytest.approx(mine, rel=0.05)
-    # a ledger is unbiased for any number of rays
     monkeypatch.setattr(energy_ledger, "SIDE", 32)
     final = render(project(), ledger=True)
     for reported in (found, final):

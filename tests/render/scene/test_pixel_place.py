@@ -8,7 +8,7 @@ import pytest
 from flarewright import Camera, Light, Lines, Output, Project, Quality, render
 from flarewright.errors import ProjectError
 from flarewright.io.lens.library import library_names
-from flarewright.model import Imperfection
+from flarewright.model import Art, Imperfection, Rule
 from flarewright.optics.rays.image_height import image_heights
 from flarewright.render.scene.direct_image import direct_image
 from flarewright.render.scene.pixel_place import TOLERANCE_PX, direct_images, field_angles_at, image_px
@@ -86,7 +86,8 @@ def test_the_drawn_light_has_its_centroid_at_the_pixel(place, changes, light):
     project = Project(
         lens="heliar-tronnier", f_number=5.6, camera=camera,
         lights=[Light(field_deg=field_angles_at(images, place), **light)],
-        output=Output(layers="passes"), quality=Quality(mode="final", wavelengths=3, ringing="off", cull=0.9),
+        output=Output(layers="passes"), quality=Quality(mode="final", wavelengths=3, ringing="off"),
+        art=Art(rules=(Rule(select="all", enable=False),)),
     )  # fmt: skip
     drawn = next(layer for layer in render(project).layers if layer.name == "starburst")
     pixels = drawn.pixels.sum(axis=2).astype(float)

@@ -15,11 +15,11 @@ from flarewright.render.scene.placement_remarks import veil_remarks
 SIZE = (64, 36)
 
 
-def rendering(*fields, starburst=False, size=SIZE, **light):
+def rendering(*fields, starburst=False, size=SIZE, step=1.0, **light):
     return render(
         Project(
             lens="tessar-brendel", lights=tuple(Light(field_deg=field, **light) for field in fields), f_number=8.0,
-            camera=Camera(size_px=size), quality=Quality(mode="draft", wavelengths=3),
+            camera=Camera(size_px=size), quality=Quality(mode="draft", wavelengths=3, source_step_deg=step),
             output=Output(layers="passes", starburst=starburst),
         )
     )  # fmt: skip
@@ -62,7 +62,7 @@ def test_corners_and_several_lights():
 def test_the_nearest_part_of_a_large_light_counts():
     """Part of it is inside."""
     assert remarks((15.0, 0.0)) != []
-    assert remarks((15.0, 0.0), diameter_deg=10.0, size=(16, 9)) == []
+    assert remarks((15.0, 0.0), diameter_deg=10.0, size=(16, 9), step=3.0) == []
 
 
 def layer(pixels):

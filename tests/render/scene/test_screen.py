@@ -27,6 +27,8 @@ def exact_and_seen(lens):
     project = project_for_lens(lens).replace(
         camera=Camera(size_px=size_px), output=Output(layers="passes"), coating=films
     )
+    if lens == "triplet-pestrecov":
+        project = project.replace(quality=project.quality.replace(paths="same-side"))
     return [
         {layer.name: layer.pixels for layer in render(each).layers}
         for each in (project, project.replace(quality=project.quality.replace(screen=True)))

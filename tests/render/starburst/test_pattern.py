@@ -229,7 +229,7 @@ def test_a_draft_errs_near_the_centre_only(f_number, iris):
 )
 def test_even_blades_give_n_spikes_odd_ones_2n(blades, spikes, f_number):
     iris = SIX if blades == 6 else Iris(blades=blades)
-    E = layer(iris, f_number, 0.056, (350, 350), (175.0, 175.0))[..., 1]
+    E = layer(iris, f_number, 0.056, (350, 350), (175.0, 175.0), WHITE_NM[::4], WHITE[::4])[..., 1]
     turn = np.linspace(0, 2 * np.pi, 1440, endpoint=False)
     ring = np.zeros(1440)
     for r in range(125, 165, 2):
