@@ -178,10 +178,8 @@ STEEP = {
 STEEP_FAST = (
     "sliver", "red end", "draft", "draft of bare glass", "draft that bends at one end", "abrupt end of a draft",
 )  # fmt: skip
-# 41 lines show these within 0.3 % of what 61 or 81 do, and the films of a long lens cost time at each
-FEWER_LINES = {
-    "sliver": 41, "red end": 41, "draft": 41, "draft of bare glass": 41, "draft that bends at one end": 41,
-}  # fmt: skip
+# 41 lines show these within 0.3 % of what 61 do, and the films of a long lens cost time at each
+FEWER_LINES = {"sliver": 41, "red end": 41, "draft": 41}
 # nine lines, none of which is among seven traced wavelengths
 FEW_LINES = Lines(lines=tuple((nm, 1.0) for nm in (367.0, 383.0, 402.0, 436.0, 480.0, 546.0, 578.0, 640.0, 700.0)))
 

@@ -28,7 +28,7 @@ D_LINE = Lines(lines=((587.56, 1.0),))
 SIZE = (120, 80)
 FINE = 8
 # half of the ghosts suffice to test holdouts
-SOME = {"paths": "same-side", "source_step_deg": 2.0}
+SOME = {"paths": "same-side"}
 QUALITIES = [SOME, pytest.param({}, marks=pytest.mark.slow)]
 DISC = Light(field_deg=(6.0, 4.0), spectrum=D_LINE, diameter_deg=3.0)
 
@@ -158,8 +158,8 @@ def test_a_state_of_another_holdout_is_refused(tmp_path, monkeypatch):
     """The state compares the effect of a holdout, not its file name."""
     monkeypatch.setattr(estimator, "SIDE", 16)
     file, state = tmp_path / "m.png", tmp_path / "a.state.npz"
-    quality = {"reference_samples": 1, "reference_from": "light", "source_step_deg": 3.0}
-    made = project(DISC, Holdout(image=matte(file, 94.0)), "reference", quality=quality, starburst=False)
+    quality = {"reference_samples": 1, "reference_from": "light"}
+    made = project(DISC, Holdout(image=matte(file, 94.0)), "reference", quality=quality)
     render(made, run=ReferenceRun(state_file=state))
     render(made, run=ReferenceRun(resume=read_reference_state(state)))
     matte(file, 96.0)

@@ -171,8 +171,7 @@ def test_a_scratch_is_drawn_in_its_whole_window(normal, width, monkeypatch):
 
 
 def test_dirt_stays_where_it_is_when_the_iris_closes():
-    # fine dust is much dust, drawn as coarse dust is
-    for dirt in (SOILS[name] for name in ("dust", "scratches", "fingerprint")):
+    for dirt in SOILS.values():
         wide, small = generate_dirt(dirt, 8.0), generate_dirt(dirt, 4.0)
         for many, few in ((wide.discs, small.discs), (wide.arcs, small.arcs)):
             central = np.hypot(many[:, 0], many[:, 1]) * 8.0 < 4.0 * FIELD - 0.5
