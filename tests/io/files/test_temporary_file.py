@@ -50,5 +50,6 @@ def test_files_of_living_processes_other_machines_and_other_targets_stay(tmp_pat
     for name in [*kept, f".a.{machine}-{dead}-{token}.part.exr"]:
         (tmp_path / name).touch()
     remove_abandoned(target)
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(kept)
+    # the parent is process 1 where a shell left this one behind
+    assert {path.name for path in tmp_path.iterdir()} == set(kept)
     remove_abandoned(tmp_path / "no" / "folder.exr")
