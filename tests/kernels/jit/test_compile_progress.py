@@ -160,6 +160,8 @@ def test_commands_pass_their_bar_to_the_compiler(words, monkeypatch, tmp_path):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("flarewright.cli.app.head_start", lambda rings: contextmanager(lambda: (yield))())
+    # tests are helpers, which compile nothing ahead
+    monkeypatch.setattr("flarewright.render.warmup.is_helper", lambda: False)
     monkeypatch.setattr("flarewright.render.warmup.absent", list)
     monkeypatch.setattr(warmup, "absent", list)
     monkeypatch.setattr("flarewright.render.warmup.compile_together", together)
