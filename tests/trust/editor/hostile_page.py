@@ -11,7 +11,7 @@ import shutil
 import socketserver
 import tempfile
 import threading
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -123,10 +123,12 @@ def _browser() -> tuple[Any, int, dict[str, str]] | None:
     class Website(http.server.BaseHTTPRequestHandler):
         def do_GET(self) -> None:
             page = pages.get(self.path)
-            self.send_response(200 if page else 404)
-            self.send_header("content-type", "text/html")
-            self.end_headers()
-            self.wfile.write((page or "").encode())
+            # the browser may have left the page
+            with suppress(ConnectionError):
+                self.send_response(200 if page else 404)
+                self.send_header("content-type", "text/html")
+                self.end_headers()
+                self.wfile.write((page or "").encode())
 
         def log_message(self, *_: Any) -> None:
             pass
