@@ -70,8 +70,9 @@ def vertex_positions(lens: Lens) -> Floats:
 
 
 def gap_indices(lens: Lens, wavelength_nm: float) -> Floats:
-    """Return the index before row 0 and behind every row, shape (K + 1,); shared, therefore read-only."""
-    return _LAST.indices(lens, wavelength_nm)
+    """Return the index before row 0 and behind every row, shape (K + 1,)."""
+    # a copy, not a read-only array, for which kernels would be compiled again
+    return _LAST.indices(lens, wavelength_nm).copy()
 
 
 def gap_indices_at(lens: Lens, wavelengths_nm: Floats) -> Floats:
@@ -109,9 +110,7 @@ class _LastLens:
             self._held = _, found = lens, {}
         indices = found.get(wavelength_nm)
         if indices is None:
-            indices = np.array(_in_gaps(lens, 1.0, lambda medium: _index(medium, wavelength_nm)))
-            indices.setflags(write=False)
-            found[wavelength_nm] = indices
+            found[wavelength_nm] = indices = np.array(_in_gaps(lens, 1.0, lambda medium: _index(medium, wavelength_nm)))
         return indices
 
 
