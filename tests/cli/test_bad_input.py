@@ -612,7 +612,7 @@ def test_an_iris_image_that_a_lens_file_names_is_looked_for(capsys, folder):
 
 def test_a_binary_project_and_a_folder_as_project(capsys, folder):
     (folder / "bin.toml").write_bytes(bytes(range(256)))
-    # "save it as UTF-8" helps nobody who gave a picture
+    # "save it as UTF-8" does not help a user who gave a picture
     refuse(
         capsys, folder, ["project", "check", "bin.toml"], "bin.toml is no text in UTF-8 but other data: a project file"
     )

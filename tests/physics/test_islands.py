@@ -121,7 +121,7 @@ def test_a_spot_on_the_mirror_axis_between_the_samples_is_found():
 
 @pytest.mark.parametrize("path", [(8, 0), (9, 2)])
 def test_a_spot_on_the_mirror_axis_whose_neighbours_all_end_at_one_surface_is_found(path):
-    """0.3 mm wide in cells of 0.95 mm; no ray of the first scan tells that light passes near it."""
+    """0.3 mm wide in cells of 0.95 mm; no ray of the first scan shows that light passes near it."""
     if not (ASPHERES / ULTRA_WIDE).exists():
         pytest.skip(f"{ASPHERES} is not there")
     made = setup(load_lens(ASPHERES / ULTRA_WIDE), (0.0, 9.8188), COATINGS["bare"])

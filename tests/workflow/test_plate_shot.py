@@ -199,8 +199,8 @@ def test_frames_of_a_plate_outside_the_keys_of_the_project_are_not_drawn_in_sile
     moving = project(f_number=None, curves=(stopping,))
     with pytest.raises(FlarewrightError, match=r"frames 1001-1003 lie outside the project's 1-2 .* --start 1001"):
         shot_frames(moving, None, settings(plates))
-    begun = moving.replace(timeline=moving.timeline.replace(start=1001))
-    frames, remarks = shot_frames(begun, None, settings(plates))
+    started = moving.replace(timeline=moving.timeline.replace(start=1001))
+    frames, remarks = shot_frames(started, None, settings(plates))
     assert frames == (1001, 1002, 1003)
     assert remarks == ["frame 1003 lies outside the keys, 1001-1002: everything rests there"]
 

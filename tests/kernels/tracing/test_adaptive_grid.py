@@ -213,8 +213,8 @@ def missed(lens: str, field, f_number: float, which: str, n: int, wavelengths: i
     """
     shot = shot_of(lens, field, f_number, wavelengths)
     total = kept = 0.0
-    paths = ghost_paths(load_lens(lens), which if which in ("all", "same-side") else "all")
-    for path in [path for path in paths if which in ("all", "same-side", path.name)]:
+    some = which if which in ("all", "same-side") else "all"
+    for path in (path for path in ghost_paths(load_lens(lens), some) if which in (some, path.name)):
         for w in range(len(shot.packed.wavelengths_nm)):
             everything, inside = dense_flux(shot, path, w, n)
             total, kept = total + everything, kept + inside

@@ -117,6 +117,7 @@ def _fill_rows(
             if x0 >= lb and x0 + BLOCK <= ra:
                 # no edge crosses this block. The loop length is a variable: the compiler would unroll a constant one
                 for m in range(lanes):
+                    # int32 as in `weave`
                     value = min(max(first + slope * np.float32(np.int32(m)), low), high)
                     at = place + np.uint64(m)
                     flat[at] += red * value

@@ -227,7 +227,8 @@ def weave(patterns, table, corners, places, light, where, beside, below, row, fi
     Notes
     -----
     One loop for each look-up form, without calls: passing arrays would take longer than most look-ups. Indices are
-    computed for several pixels at once, the values are then read one by one.
+    computed for several pixels at once, the values are then read one by one. Pixels are counted in int32: without
+    AVX-512 a vector of int64 becomes floats one by one.
     """
     y, begin = row + 0.5, np.uint64(first)
     count = last + 1 - first
@@ -281,7 +282,7 @@ def weave(patterns, table, corners, places, light, where, beside, below, row, fi
             back_x, back_y = (offset - radius) * cosine, (offset - radius) * sine
             curved = radius > zero
             across = np.float32(columns)
-            for m in range(-(-count // LANES) * LANES):
+            for m in range(padded):
                 p = min(max(u0 + du * np.float32(np.int32(m)), u_low), u_high)
                 q = abs(min(max(v0 + dv * np.float32(np.int32(m)), v_low), v_high))
                 # by symmetry fold both ends of the blade onto one corner
@@ -301,8 +302,8 @@ def weave(patterns, table, corners, places, light, where, beside, below, row, fi
                 below[np.uint64(m)] = line - cells if near else zero
         else:
             for m in range(count):
-                u = min(max(u0 + du * np.float32(np.int32(m)), u_low), u_high)
-                v = min(max(v0 + dv * np.float32(np.int32(m)), v_low), v_high)
+                u = min(max(u0 + du * np.float32(m), u_low), u_high)
+                v = min(max(v0 + dv * np.float32(m), v_low), v_high)
                 # float64 as at the other calls, so that only one version is compiled
                 light[begin + np.uint64(m)] *= pattern_value(patterns, table, corners, k, np.float64(u), np.float64(v))
         if way in (ON_EDGE, ROUND):

@@ -71,8 +71,7 @@ def vertex_positions(lens: Lens) -> Floats:
 
 def gap_indices(lens: Lens, wavelength_nm: float) -> Floats:
     """Return the index before row 0 and behind every row, shape (K + 1,)."""
-    # a copy, not a read-only array, for which kernels would be compiled again
-    return _LAST.indices(lens, wavelength_nm).copy()
+    return np.array(_in_gaps(lens, 1.0, lambda medium: _index(medium, wavelength_nm)))
 
 
 def gap_indices_at(lens: Lens, wavelengths_nm: Floats) -> Floats:
@@ -93,28 +92,6 @@ def _in_gaps(lens: Lens, air: _Index, index: Callable[[Medium | None], _Index]) 
 @lru_cache(maxsize=4096)
 def _index(medium: Medium | None, wavelength_nm: float) -> float:
     return float(refractive_index(medium, wavelength_nm))
-
-
-class _LastLens:
-    """The indices of the lens that was asked last: matrices of many paths want the same ones."""
-
-    _MOST = 256
-
-    def __init__(self) -> None:
-        # one tuple, so that threads see a lens only with its own indices
-        self._held: tuple[Lens | None, dict[float, Floats]] = None, {}
-
-    def indices(self, lens: Lens, wavelength_nm: float) -> Floats:
-        held, found = self._held
-        if held is not lens or len(found) > self._MOST:
-            self._held = _, found = lens, {}
-        indices = found.get(wavelength_nm)
-        if indices is None:
-            found[wavelength_nm] = indices = np.array(_in_gaps(lens, 1.0, lambda medium: _index(medium, wavelength_nm)))
-        return indices
-
-
-_LAST = _LastLens()
 
 
 def path_matrices(
@@ -170,7 +147,13 @@ def flare_matrices(lens: Lens, path: LightPath, wavelength_nm: float, sensor_z: 
         r_stop = Ma r_in and r_sensor = Ms r_stop (Lee and Eisemann 2013; Van Acoleyen 2025, section 4.3.1).
     """
     to_stop, total = path_matrices(lens, path, wavelength_nm, sensor_z)
-    return to_stop[0], total @ np.linalg.inv(to_stop[0])
+    return to_stop[0], _behind_stop(to_stop[0], total)
+
+
+def _behind_stop(to_stop: Matrix, total: Matrix) -> Matrix:
+    """Return Ms from Ma and Ms Ma."""
+    rear: Matrix = total @ np.linalg.inv(to_stop)
+    return rear
 
 
 def first_order(
@@ -208,8 +191,7 @@ def first_order(
     number = lens.f_number if f_number is None else f_number
     pupil = efl / number
     (sa, sb), _ = to_stop
-    # as `flare_matrices`, from the matrices that are known
-    exit_diameter, exit_z = _exit_pupil(system @ np.linalg.inv(to_stop), abs(sa) * pupil)
+    exit_diameter, exit_z = _exit_pupil(_behind_stop(to_stop, system), abs(sa) * pupil)
     return FirstOrder(
         efl=float(efl),
         bfl=float(bfl),

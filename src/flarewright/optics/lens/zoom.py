@@ -152,16 +152,16 @@ def _between(lens: Lens, focal_length: float, distance: float | None) -> Positio
     if not low * (1.0 - SLACK) <= focal_length <= high * (1.0 + SLACK):
         raise ProjectError(f"{lens.name} zooms from {low:.2f} to {high:.2f} mm, not to {focal_length:g} mm")
     number = min(max(focal_length, low), high)
-    for (_, a), (above, b) in pairwise(found):
+    for (below, a), (above, b) in pairwise(found):
         if number <= above:
-            part = _part(lens, settings[a][0], settings[b][0], number)
+            part = _part(lens, settings[a][0], settings[b][0], (below, above), number)
             one, other = _focused(lens, settings[a], distance), _focused(lens, settings[b], distance)
             return _interpolated_position(lens, one, other, part).replace(focal_length=number)
     return _focused(lens, settings[0], distance)
 
 
-def _part(lens: Lens, one: Position, other: Position, focal_length: float) -> float:
-    """Return the fraction between two positions that has a focal length, by the Illinois method."""
+def _part(lens: Lens, one: Position, other: Position, ends: tuple[float, float], focal_length: float) -> float:
+    """Return the fraction between two positions, of known focal lengths, that has a focal length: Illinois method."""
 
     def error(part: float) -> float:
         try:
@@ -174,7 +174,7 @@ def _part(lens: Lens, one: Position, other: Position, focal_length: float) -> fl
         return efl / focal_length - 1.0
 
     low, high = 0.0, 1.0
-    below, above = error(low), error(high)
+    below, above = (efl / focal_length - 1.0 for efl in ends)
     for end, found in ((low, below), (high, above)):
         if abs(found) < CLOSE:
             return end
