@@ -32,6 +32,9 @@ CLOSE, CLOSE_BESIDE_ENDED = 1.05, 1.25
 # beyond a rim is halved if r / semi-diameter bends between them by more than KINK of its variation: two rims that leave
 # a gap between the rays bend it by up to half of the variation, the curvature of one rim by a few hundredths
 NARROW, KINK = 6e-5, 0.2
+# halvings beyond the limit of a cell in which the rim bends by so much that it takes more than RIM_MISSED of the flux
+# tolerance: in a thin arc between two rims
+RIM_LEVELS, RIM_MISSED = 1, 2.0
 # a cell of at least level FAR_LEVEL is left out if at least FAR_RAYS of its nine rays land beyond FAR_RADII times the
 # picture's radius and the others end
 FAR_RAYS, FAR_RADII, FAR_LEVEL = 3, 2.0, 2
@@ -58,7 +61,8 @@ def _classify(data, nodes, crossings, iris, level, h, limits, values):
             return _split(NEAR_RIM)
         gap = level < gap_level and _may_hide_gap(data, nodes, crossings, iris_radius, view_radius, values)
         return _split(NEAR_RIM) if gap else EMPTY
-    if level >= limits.max_level:
+    last = level >= limits.max_level
+    if level >= limits.max_level + RIM_LEVELS:
         return LEAF
     x_low, x_high, y_low, y_high = np.inf, -np.inf, np.inf, -np.inf
     alive = 0
@@ -70,6 +74,8 @@ def _classify(data, nodes, crossings, iris, level, h, limits, values):
     # light outside the picture needs no refinement
     out_x, out_y = max(max(x_low, -x_high), 0.0), max(max(y_low, -y_high), 0.0)
     out2 = out_x * out_x + out_y * out_y
+    if last and (alive < nodes.size or out2 > view_radius * view_radius):
+        return LEAF
     if alive < nodes.size:
         # if the landing rays lie far outside the picture, assume the same of the light beside the rays that end, whose
         # place is unknown
@@ -97,7 +103,11 @@ def _classify(data, nodes, crossings, iris, level, h, limits, values):
                 return _split(RIM_CORNERS)
             at_rim = True
             part = bend / max(high - low, 1e-12)
+            if last and part * h > RIM_MISSED * limits.flux_tolerance:
+                return _split(RIM_BEND)
             error = max(error, part * h / limits.flux_tolerance, part * extent / tolerance)
+    if last:
+        return LEAF
     if at_fringes and extent > FRINGE_CELL:
         return _split(FRINGES)
     if extent >= 1.0:
@@ -286,7 +296,7 @@ def build_mesh(steps, lens, light, crossings, iris, box, coarse, limits):
     halved : ndarray, shape (10,), int64
         Number of cells that were halved for each of `REASONS`.
     """
-    (nx, ny), max_level = coarse, limits.max_level
+    (nx, ny), max_level = coarse, limits.max_level + RIM_LEVELS
     # the lattice of all possible nodes has room for `depth` halvings, and grows when a cell needs more
     depth = min(max_level, 2)
     # entries: node number + 1, 0 for none
@@ -343,7 +353,7 @@ def build_mesh(steps, lens, light, crossings, iris, box, coarse, limits):
                     if found == LEAF or (found == FLAT and verdict == EMPTY):
                         verdict = found
                 if (
-                    beside_light and verdict == EMPTY and level < max_level
+                    beside_light and verdict == EMPTY and level < limits.max_level
                     and has_lit_side(data, lattice, a, b, level, depth, crossings, iris[0], limits)
                 ):  # fmt: skip
                     verdict = SPLIT

@@ -18,6 +18,9 @@ PROBES = 8
 LATE_CELLS = 32
 # number of halvings of the gap between two rays if one of them ends, or if both end at different surfaces
 HALVINGS = 5
+# samples of the mirror axis along a cell where nothing else was found; numbers of halvings of the gap between two rays
+# that end at different surfaces there, and of the intervals beside the best rays
+ON_AXIS, ENDED_HALVINGS, NARROWINGS = 4, 3, 6
 # largest r / semi-diameter of a ray that passes: the box around the front touches its rim, and so may a sample
 RIM = 1.0 + 1e-6
 # where many cells pass, a gap is searched only if one of its rays has a largest r / semi-diameter of at most this
@@ -84,7 +87,8 @@ def find_box(steps, lens, light, crossings, iris_radius, view_radius, box, cells
         If fewer cells are kept, search for spots between the samples: FEW_CELLS, or 1 where a second spot beside the
         kept cells would be too faint to matter.
     slivers : int
-        1: halve gaps between rays however many cells are kept; 0: only if few cells are kept.
+        1: halve gaps between rays however many cells are kept; 2: also search the mirror axis; 0: both only if few
+        cells are kept.
     finest : tuple of float
         Sample spacing in x and in y that suffices to find a spot between the samples of a cell, mm.
     traced : ndarray, shape ((nx + 1) (ny + 1), >= 5 + 2 C)
@@ -105,8 +109,8 @@ def find_box(steps, lens, light, crossings, iris_radius, view_radius, box, cells
     -----
     Hullin 2011, section 4.2, "Ray Bounding". A cell is kept unless one of its limits is exceeded at every corner by
     more than half its variation over the cell. If few cells are kept, cells whose limits change fast are searched with
-    a finer grid; if every ray ends, the cells whose rays end latest are searched. If that finds nothing, the mirror
-    axis is searched, where a spot lies that is not one of a pair.
+    a finer grid; if every ray ends, the cells whose rays end latest are searched. A spot that is not one of a pair lies
+    on the mirror axis, even where all rays of the cells beside it end at one surface.
 
     Gaps between neighbouring rays of which one ends, or both at different surfaces, are halved repeatedly: one surface
     blocks the rays on one side, another surface those on the other side, and both may pass a sliver in between. The
@@ -165,12 +169,15 @@ def find_box(steps, lens, light, crossings, iris_radius, view_radius, box, cells
     if accepted < few_cells or slivers > 0:
         samples = Samples(px, py, data, width, hx, hy)
         _search_gaps(steps, lens, light, crossings, iris_radius, samples, accepted < few_cells, spots, sums)
-        if accepted == 0 and few_cells == FEW_CELLS and spots[1] < spots[0] and box[0] == 0.0:
-            # a spot that is not one of a pair lies on the mirror axis, even where all rays beside it end at one surface
-            axis = np.empty((ny, 2))
-            for b in range(ny):
-                axis[b, 0], axis[b, 1] = 0.0, box[2] + b * hy
-            _search_cells(steps, lens, light, crossings, iris_radius, axis, hx / PROBES, hy, 1, PROBES, spots, sums)
+        lost = accepted == 0 and few_cells == FEW_CELLS and spots[1] < spots[0]
+        if box[0] == 0.0 and (lost or slivers > 1):
+            each = ON_AXIS if lost else 1
+            places = np.empty(ny * each + 1)
+            for k in range(places.size):
+                places[k] = box[2] + k * (hy / each)
+            # the first rays of the grid lie on the axis
+            rays = _axis_rays(steps, lens, light, crossings, places) if lost else data
+            _search_axis(steps, lens, light, crossings, iris_radius, kept, ny, each, hx, hy, places, rays, spots, sums)
         for m in range(2):
             spots[2 * m] = max(spots[2 * m], box[2 * m])
             spots[2 * m + 1] = min(spots[2 * m + 1], box[2 * m + 1])
@@ -375,6 +382,106 @@ def _search_gaps(steps, lens, light, crossings, iris_radius, samples, few, spots
                     count += 1
         gaps = narrower
         n_gaps = count
+
+
+@inner
+def _search_axis(steps, lens, light, crossings, iris_radius, kept, ny, each, hx, hy, places, data, spots, sums):
+    """Search the mirror axis beside the kept cells, with `each` rays a cell; add passing ones to `spots` and `sums`.
+
+    Light may lie beside a ray that comes nearer to its limits than its neighbours, or whose neighbours end. Such a ray
+    may hide between two that end at different surfaces.
+    """
+    count, step = places.size, hy / each
+    width, share = hx / PROBES, hx * np.cos(light.tilt) / PROBES
+    excess = np.empty(count)
+    for k in range(count):
+        excess[k] = _excess(data, k, crossings, iris_radius)
+        if kept[min(k // each, ny - 1)] == 1 or kept[max(k - 1, 0) // each] == 1:
+            # in the region that is known
+            excess[k] = 0.0
+        elif excess[k] <= RIM:
+            _add_spot(spots, sums, data, k, 0.0, places[k], width, step, share * step)
+    # place, excess and distance of neighbours; place of a gap's middle, and where the rays on both sides end
+    best, gaps = np.empty((count << ENDED_HALVINGS, 3)), np.empty((count, 3))
+    n_best, n_gaps = 0, 0
+    for k in range(count - 1):
+        if k > 0 and RIM < excess[k] < np.inf and excess[k] <= min(excess[k - 1], excess[k + 1]):
+            best[n_best, 0], best[n_best, 1], best[n_best, 2] = places[k], excess[k], step
+            n_best += 1
+        if excess[k] == np.inf and excess[k + 1] == np.inf and data[k, X] != data[k + 1, X]:
+            gaps[n_gaps, 0], gaps[n_gaps, 1], gaps[n_gaps, 2] = places[k] + 0.5 * step, data[k, X], data[k + 1, X]
+            n_gaps += 1
+    for _ in range(ENDED_HALVINGS):
+        step *= 0.5
+        places = np.empty(n_gaps)
+        for k in range(n_gaps):
+            places[k] = gaps[k, 0]
+        data = _axis_rays(steps, lens, light, crossings, places)
+        narrower, count = np.empty((2 * n_gaps, 3)), 0
+        for k in range(n_gaps):
+            far = _excess(data, k, crossings, iris_radius)
+            if far <= RIM:
+                _add_spot(spots, sums, data, k, 0.0, places[k], width, step, share * step)
+            elif far < np.inf:
+                best[n_best, 0], best[n_best, 1], best[n_best, 2] = places[k], far, step
+                n_best += 1
+            for side in range(2):
+                if far == np.inf and data[k, X] != gaps[k, side + 1]:
+                    narrower[count, 0] = places[k] + (side - 0.5) * step
+                    narrower[count, side + 1], narrower[count, 2 - side] = gaps[k, side + 1], data[k, X]
+                    count += 1
+        gaps, n_gaps = narrower, count
+    _narrow(steps, lens, light, crossings, iris_radius, best, n_best, width, share, spots, sums)
+
+
+@inner
+def _narrow(steps, lens, light, crossings, iris_radius, best, n_best, width, share, spots, sums):
+    """Halve the intervals beside each of the `best` rays on the mirror axis, around the best of its three each time.
+
+    `best`, changed, holds places, excesses and distances of the neighbours; a ray that passes ends its search.
+    """
+    for _ in range(NARROWINGS):
+        places = np.empty(2 * n_best)
+        for k in range(n_best):
+            best[k, 2] *= 0.5
+            places[2 * k], places[2 * k + 1] = best[k, 0] - best[k, 2], best[k, 0] + best[k, 2]
+        data = _axis_rays(steps, lens, light, crossings, places)
+        count = 0
+        for k in range(n_best):
+            place, least, step = best[k, 0], best[k, 1], best[k, 2]
+            for m in range(2 * k, 2 * k + 2):
+                far = _excess(data, m, crossings, iris_radius)
+                if far <= RIM:
+                    _add_spot(spots, sums, data, m, 0.0, places[m], width, step, share * step)
+                if far < least:
+                    place, least = places[m], far
+            if least > RIM:
+                best[count, 0], best[count, 1], best[count, 2] = place, least, step
+                count += 1
+        n_best = count
+
+
+@inner
+def _axis_rays(steps, lens, light, crossings, places):
+    """Trace rays through places on the mirror axis, shape (N,)."""
+    px = np.empty(places.size)
+    for k in range(places.size):
+        px[k] = 0.0
+    data = np.empty((places.size, STOP_X + 2 * crossings))
+    trace_lanes(steps, lens, light, px, places, data)
+    return data
+
+
+@borrowing
+def _excess(data, k, crossings, iris_radius):
+    """Return how far out a ray comes: the largest r / semi-diameter of rims and iris; infinite for a ray that ends."""
+    if data[k, ALIVE] == 0.0:
+        return np.inf
+    far = data[k, REL]
+    for c in range(crossings):
+        u, v = data[k, STOP_X + 2 * c], data[k, STOP_X + 2 * c + 1]
+        far = max(far, np.sqrt(u * u + v * v) / iris_radius)
+    return far
 
 
 @borrowing

@@ -22,7 +22,7 @@ GRID = (4, 8)
 COARSE_GRID = (3, 6)
 MAX_LEVEL = 6
 # one halving more in a region of which less than this part is lit, in full detail
-NARROW = 0.04
+NARROW = 0.05
 # least number of halvings of cells that the rim crosses, one less where the rim may be rough
 RIM_LEVEL = 2
 # largest relative flux error from the rim

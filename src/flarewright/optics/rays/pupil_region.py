@@ -227,7 +227,7 @@ def find_region(
             finest,
             traced if whole else None,
             few_cells,
-            slivers=(whole or slivers or small) and not quick,
+            slivers=0 if quick else 2 if whole else int(slivers or small),
         )
         slivers = slivers or bool(spots[1] > spots[0])
         plenty = sums[4] >= (BLOB if whole else SMALL_REGION)
@@ -353,7 +353,7 @@ def measure_region(
     """
     w, cells = wavelengths_fitted(packed)[0], cells_across(packed, FINER)
     arguments = (*_looking_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
-    found, sums, spots = _scan(packed, arguments, box, cells, _finest(packed, front_box(packed, tilt)), slivers=True)
+    found, sums, spots = _scan(packed, arguments, box, cells, _finest(packed, front_box(packed, tilt)), slivers=1)
     if found[1] <= found[0] or sums[0] <= 0.0:
         return None
     return _region(_with_room(found, box, cells), sums, bool(spots[1] > spots[0]))
@@ -414,11 +414,11 @@ def _scan(
     finest: tuple[float, float],
     traced: Floats | None = None,
     few_cells: int = FEW_CELLS,
-    slivers: bool = False,
+    slivers: int = 0,
 ) -> tuple[Floats, Floats, Floats]:
     """Run the pre-pass over a box at one wavelength."""
     data = _UNTRACED if traced is None else traced
-    found, sums, spots = find_box(*arguments, box, cells, few_cells, int(slivers), finest, data)
+    found, sums, spots = find_box(*arguments, box, cells, few_cells, slivers, finest, data)
     if packed.halves == 1:
         # the kernel counts every ray for its mirror image too
         sums[:3] *= 0.5
