@@ -33,7 +33,7 @@ CLOSE, CLOSE_BESIDE_ENDED = 1.05, 1.25
 # a gap between the rays bend it by up to half of the variation, the curvature of one rim by a few hundredths
 NARROW, KINK = 6e-5, 0.2
 # halvings beyond the limit of a cell in which the rim bends by so much that it takes more than RIM_MISSED of the flux
-# tolerance: in a thin arc between two rims
+# tolerance, where light passes slivers: in a thin arc between two rims. A grid with such cells costs memory and time
 RIM_LEVELS, RIM_MISSED = 1, 2.0
 # a cell of at least level FAR_LEVEL is left out if at least FAR_RAYS of its nine rays land beyond FAR_RADII times the
 # picture's radius and the others end
@@ -62,7 +62,7 @@ def _classify(data, nodes, crossings, iris, level, h, limits, values):
         gap = level < gap_level and _may_hide_gap(data, nodes, crossings, iris_radius, view_radius, values)
         return _split(NEAR_RIM) if gap else EMPTY
     last = level >= limits.max_level
-    if level >= limits.max_level + RIM_LEVELS:
+    if level >= limits.max_level + (RIM_LEVELS if limits.slivers > 0 else 0):
         return LEAF
     x_low, x_high, y_low, y_high = np.inf, -np.inf, np.inf, -np.inf
     alive = 0
@@ -305,7 +305,7 @@ def build_mesh(steps, lens, light, crossings, iris, box, coarse, limits):
     offsets[0] = 0
     for level in range(max_level + 1):
         offsets[level + 1] = offsets[level] + (nx << level) * (ny << level)
-    state = np.empty(offsets[depth + 1], dtype=np.int64)
+    state = np.empty(offsets[depth + 1], dtype=np.int8)
     for k in range(state.size):
         state[k] = UNKNOWN
     columns = STOP_X + 2 * crossings
@@ -415,7 +415,7 @@ def _enlarged(lattice, state, cells):
     for i in range(lattice.shape[0]):
         for j in range(lattice.shape[1]):
             finer[2 * i, 2 * j] = lattice[i, j]
-    longer = np.empty(cells, dtype=np.int64)
+    longer = np.empty(cells, dtype=np.int8)
     for k in range(cells):
         longer[k] = state[k] if k < state.size else UNKNOWN
     return finer, longer
