@@ -115,6 +115,10 @@ PROJECT_FILES = {
     "huge picture": (PROJECT + "[camera]\nsize_px = [100000, 10]\n", "between 1 and 32768"),
     "unknown quality": (PROJECT + '[quality]\nmode = "best"\n', "'draft', 'final' or 'reference'"),
     "error of nothing": (PROJECT + "[quality]\nreference_error = 0\n", "quality.reference_error should be greater"),
+    "error of 1e-308": (
+        PROJECT + "[quality]\nreference_error = 1e-308\n",
+        "quality.reference_error should be greater than or equal to",
+    ),
     "error of pixels": (PROJECT + '[quality]\nreference_error_of = "pixels"\n', "'total' or 'blocks'"),
     "three orders": (PROJECT + "[quality]\norders = 3\n", "quality.orders should be 2 or 4"),
     "limit zero": (PROJECT + "[quality]\norder4_limit = 0\n", "quality.order4_limit should be greater than 0"),

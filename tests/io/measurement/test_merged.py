@@ -52,6 +52,16 @@ def test_a_damaged_index_is_told(tmp_path: Path, text: str | None, word: str) ->
         read_run(tmp_path)
 
 
+@pytest.mark.parametrize("gain", ["9223372036854775808", "1e-30", "0"])
+def test_a_gain_that_no_light_has_is_told(tmp_path: Path, gain: str) -> None:
+    """The first made single-precision variances of 0, and least squares without a solution."""
+    run = MergedRun(size_px=(8, 6), frames=(_frame().info,), axis_px=(2.0, 3.1), px_per_rad=480.0)
+    text = run.model_dump_json().replace('"gain":1.0', f'"gain":{gain}')
+    (tmp_path / "merged.json").write_text(text)
+    with pytest.raises(FlarewrightError, match=r"frames\[0\]\.gain"):
+        read_run(tmp_path)
+
+
 def test_a_missing_or_damaged_frame_is_told(tmp_path: Path) -> None:
     info = _frame().info
     with pytest.raises(FlarewrightError, match="does not exist"):

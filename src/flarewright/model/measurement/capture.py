@@ -153,8 +153,8 @@ class FrameInfo(Frozen):
     clipped_share : float
         Fraction of the pixels that were clipped in every exposure.
     gain, gain_error : float
-        Brightness of the light in this frame relative to the prediction from its neighbours, and its standard error.
-        The file holds the photographed values; `io.measurement.merged.read_frame` divides by the gain.
+        Brightness of the light in this frame relative to the prediction from its neighbours, 1e-4 to 1e4, and its
+        standard error. The file holds the photographed values; `io.measurement.merged.read_frame` divides by the gain.
     """
 
     file: str
@@ -171,7 +171,7 @@ class FrameInfo(Frozen):
     f_number: Positive | None = None
     focal_mm: Positive | None = None
     clipped_share: float = Field(0.0, ge=0.0, le=1.0)
-    gain: Positive = 1.0
+    gain: float = Field(1.0, ge=1e-4, le=1e4)
     gain_error: float = Field(0.0, ge=0.0)
 
     @property

@@ -103,7 +103,8 @@ class Quality(Frozen):
     seed : int
         Seed of the random numbers.
     reference_error : float
-        Reference quality stops when the relative standard error of the ghosts is below this.
+        Reference quality stops when the relative standard error of the ghosts is below this, 1e-5 to 1. Rays grow with
+        its inverse square, so smaller ones are never reached.
     reference_error_of : {"total", "blocks"}
         Error of the whole ghost flux in the picture, or of its blocks of 16 x 16 pixels.
     reference_from : {"auto", "light", "camera"}
@@ -125,7 +126,7 @@ class Quality(Frozen):
     source_step_deg: float = Field(2.0, ge=0.05, le=60.0)
     screen: StrictBool = False
     seed: int = Field(0, ge=0, lt=2**63)
-    reference_error: float = Field(0.02, gt=0.0, le=1.0)
+    reference_error: float = Field(0.02, ge=1e-5, le=1.0)
     reference_error_of: Literal["total", "blocks"] = "blocks"
     reference_from: Literal["auto", "light", "camera"] = "auto"
     reference_samples: int | None = Field(None, ge=1)
