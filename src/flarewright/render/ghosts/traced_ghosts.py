@@ -224,15 +224,15 @@ def draw_final(
     rings = None
     if visibility >= STEP_CONTRAST:
         rings = _seen_rings(item, quality, bundle, to_pixels, detail, around)
-    most = MOST_BRIDGES if visibility == float("inf") else min(MOST_BRIDGES, max(1, int(visibility / STEP_CONTRAST)))
-    _draw_in_all(item, bundle, spectrum, rings, fine, canvas, detail, most if quality.bridge else 0, stop, watch)
+    most = _steps_shown(shot, spectrum, visibility) if quality.bridge else None
+    _draw_in_all(item, bundle, spectrum, rings, fine, canvas, detail, most, stop, watch)
 
 
 def _draw_in_all(
     item: FinalPass, sharp: Bundle, spectrum: PathSpectrum | None, rings: Rings | None, fine: Refinement,
-    canvas: Canvas, detail: int, most: int, stop: Event | None, watch: Watch,
+    canvas: Canvas, detail: int, most: list[int] | None, stop: Event | None, watch: Watch,
 ) -> None:  # fmt: skip
-    """Draw a ghost at all traced wavelengths, and between two of them at most `most` - 1 times; 0: not at all."""
+    """Draw a ghost at all traced wavelengths, and between them in at most `most` steps a gap; None: not at all."""
     shot, path, bundle, step_px = item.shot, item.path, sharp, BRIDGE_PX
     tilt, opening, count = shot.incidence.tilt, shot.opening, len(shot.packed.wavelengths_nm)
     to_pixels = item.to_pixels / 2.0**detail
@@ -245,7 +245,7 @@ def _draw_in_all(
     traced = [trace_bundle(shot.packed, w, bundle, tilt) for w in range(count)]
     watch.traced(bundle, count)
     pieces = [1] * (count - 1)
-    if most > 0:
+    if most is not None:
         limit = float("inf") if rings is None else opening.radius
         found = _bridges(traced, limit, item.view_radius, fine.scale / step_px, most)
         pieces = [max(n, item.least_steps) for n in found]
@@ -450,12 +450,28 @@ def draw_alone(
     canvas.add(filtered_ghost(pixels, art, frame, items[0].to_pixels / 2.0**detail, own), detail)
 
 
+def _steps_shown(shot: Shot, spectrum: PathSpectrum | None, visibility: float) -> list[int]:
+    """Return the number of steps in each gap between traced wavelengths beyond which single steps are invisible.
+
+    A step has an equal part of the light in its gap. It is seen in the channel to which the gap gives the largest part
+    of the ghost's light.
+    """
+    waves = shot.packed.wavelengths_nm
+    if visibility == float("inf"):
+        return [MOST_BRIDGES] * (len(waves) - 1)
+    light = np.abs(shot.weights(waves, spectrum)) * (1.0 if spectrum is None else spectrum.carried[:, None])
+    parts = light / np.maximum(light.sum(axis=0), np.finfo(float).tiny)
+    gaps = 0.5 * (parts[1:] + parts[:-1]).max(axis=1)
+    return [min(max(int(part), 1), MOST_BRIDGES) for part in gaps * (visibility / STEP_CONTRAST)]
+
+
 def _bridges(
-    traced: list[Floats], iris_radius: float, view_radius: float, steps_per_mm: float, most: int
-) -> list[int]:  # fmt: skip
+    traced: list[Floats], iris_radius: float, view_radius: float, steps_per_mm: float, most: list[int]
+) -> list[int]:
     """Return the number of steps in each gap between traced wavelengths so that no colour step is visible."""
-    if most == 1:
-        return [1] * (len(traced) - 1)
     # use a quantile: the nodes that move farthest carry hardly any light
-    gaps = [shift_quantile(short, long, iris_radius, view_radius, SHIFT_QUANTILE) for short, long in pairwise(traced)]
-    return [min(max(ceil(gap * steps_per_mm), 1), most) for gap in gaps]
+    shifts = [
+        shift_quantile(short, long, iris_radius, view_radius, SHIFT_QUANTILE) if limit > 1 else 0.0
+        for (short, long), limit in zip(pairwise(traced), most, strict=True)
+    ]
+    return [min(max(ceil(shift * steps_per_mm), 1), limit) for shift, limit in zip(shifts, most, strict=True)]
