@@ -68,6 +68,21 @@ SUPERZOOM = "Sigma_19-120mm_F3.62-5.8_(Sigma_18-125mm_F3.5-5.6_DC).lens"
 CANON = "Canon_19-137mm_F3.59-5.97_IS_(Canon_EF-S18-135mm_f3.5-5.6_IS_STM).lens"
 
 
+def compared(file, field, coating, path, effort):
+    """Return what the dense search finds of a path; then the program's flux, size and grid. Skip without the file."""
+    if not file.exists():
+        pytest.skip(f"{file.parent} is not there")
+    made = setup(load_lens(file), field, COATINGS[coating])
+    path = ghost_path(made.lens, *path)
+    return dense_search(made, path, effort), *measured(made, path)
+
+
+def holds(bundle, found, part=0.999):
+    """Return whether a grid holds more than a part of the light that the dense search found."""
+    light = found.rays[:, 2]
+    return light @ covered(bundle, found.rays[:, :2]) > part * light.sum()
+
+
 @pytest.mark.parametrize(
     ("file", "field", "coating", "path", "flux", "rms"),
     [
@@ -98,16 +113,10 @@ def test_an_arc_that_leaves_the_first_box_is_followed():
 
     Flux and size are those of the oracle, by `confirm`, +-0.2 %.
     """
-    if not (CORPUS / SIGMA).exists():
-        pytest.skip(f"{CORPUS} is not there")
-    made = setup(load_lens(CORPUS / SIGMA), (0.0, 10.63), COATINGS["coated"])
-    path = ghost_path(made.lens, 3, 1)
-    found = dense_search(made, path, FIRST)
-    flux, rms, bundle = measured(made, path)
+    found, flux, rms, bundle = compared(CORPUS / SIGMA, (0.0, 10.63), "coated", (3, 1), FIRST)
     assert flux == pytest.approx(1.145e-4, rel=FLUX)
     assert rms == pytest.approx(11.0155, rel=SIZE)
-    light = found.rays[:, 2]
-    assert light @ covered(bundle, found.rays[:, :2]) > 0.999 * light.sum()
+    assert holds(bundle, found)
 
 
 def test_a_spot_on_the_mirror_axis_between_the_samples_is_found():
@@ -123,25 +132,15 @@ def test_a_spot_on_the_mirror_axis_between_the_samples_is_found():
 @pytest.mark.parametrize("path", [(8, 0), (9, 2)])
 def test_a_spot_on_the_mirror_axis_whose_neighbours_all_end_at_one_surface_is_found(path):
     """0.3 mm wide in cells of 0.95 mm; no ray of the first scan shows that light passes near it."""
-    if not (ASPHERES / ULTRA_WIDE).exists():
-        pytest.skip(f"{ASPHERES} is not there")
-    made = setup(load_lens(ASPHERES / ULTRA_WIDE), (0.0, 9.8188), COATINGS["bare"])
-    found = dense_search(made, ghost_path(made.lens, *path), FIRST)
-    flux, rms, _ = measured(made, ghost_path(made.lens, *path))
+    found, flux, rms, _ = compared(ASPHERES / ULTRA_WIDE, (0.0, 9.8188), "bare", path, FIRST)
     assert flux == pytest.approx(found.flux, rel=FLUX)
     assert rms == pytest.approx(found.rms, rel=SIZE)
 
 
 def test_light_is_followed_into_cells_whose_own_rays_fail():
     """Ends of the arc 3-2 enter coarse cells beside it, in which 3 % of its light were lost."""
-    if not (ASPHERES / ULTRA_WIDE).exists():
-        pytest.skip(f"{ASPHERES} is not there")
-    made = setup(load_lens(ASPHERES / ULTRA_WIDE), (0.0, 9.8188), COATINGS["bare"])
-    path = ghost_path(made.lens, 3, 2)
-    found = dense_search(made, path, FIRST)
-    _, rms, bundle = measured(made, path)
-    light = found.rays[:, 2]
-    assert light @ covered(bundle, found.rays[:, :2]) > 0.99 * light.sum()
+    found, _, rms, bundle = compared(ASPHERES / ULTRA_WIDE, (0.0, 9.8188), "bare", (3, 2), FIRST)
+    assert holds(bundle, found, 0.99)
     assert rms == pytest.approx(found.rms, rel=SIZE)
 
 
@@ -157,16 +156,10 @@ def test_light_is_followed_into_cells_whose_own_rays_fail():
 )
 def test_an_arc_across_the_mirror_axis_is_found_between_the_samples(file, field, path):
     """Rays near it on the axis come nearer to their limits than their neighbours, or do not end as these do."""
-    if not file.exists():
-        pytest.skip(f"{file.parent} is not there")
-    made = setup(load_lens(file), (0.0, field), COATINGS["bare"])
-    path = ghost_path(made.lens, *path)
-    found = dense_search(made, path, SECOND)
-    flux, rms, bundle = measured(made, path)
+    found, flux, rms, bundle = compared(file, (0.0, field), "bare", path, SECOND)
     assert flux == pytest.approx(found.flux, rel=FLUX)
     assert rms == pytest.approx(found.rms, rel=SIZE)
-    light = found.rays[:, 2]
-    assert light @ covered(bundle, found.rays[:, :2]) > 0.999 * light.sum()
+    assert holds(bundle, found)
 
 
 @pytest.mark.parametrize(
@@ -181,12 +174,7 @@ def test_an_arc_across_the_mirror_axis_is_found_between_the_samples(file, field,
 )
 def test_light_in_cells_of_a_bent_rim_is_whole(file, field, coating, path):
     """Straight rims in the finest cells of a thin arc lose light on both of its sides."""
-    if not file.exists():
-        pytest.skip(f"{file.parent} is not there")
-    made = setup(load_lens(file), (0.0, field), COATINGS[coating])
-    path = ghost_path(made.lens, *path)
-    found = dense_search(made, path, SECOND)
-    flux, rms, _ = measured(made, path)
+    found, flux, rms, _ = compared(file, (0.0, field), coating, path, SECOND)
     assert flux == pytest.approx(found.flux, rel=0.6 * FLUX)
     assert rms == pytest.approx(found.rms, rel=SIZE)
 
@@ -229,12 +217,7 @@ def test_an_arc_between_a_rim_and_the_iris_is_found_where_rays_end_beside_it():
 )
 def test_light_between_the_nodes_of_coarse_cells_is_found(file, field, coating, path):
     """No node of these cells passes, but two rims leave a gap between the nodes."""
-    if not file.exists():
-        pytest.skip(f"{file.parent} is not there")
-    made = setup(load_lens(file), (0.0, field), COATINGS[coating])
-    path = ghost_path(made.lens, *path)
-    found = dense_search(made, path, SECOND)
-    flux, rms, bundle = measured(made, path)
+    found, flux, rms, bundle = compared(file, (0.0, field), coating, path, SECOND)
     assert flux == pytest.approx(found.flux, rel=0.3 * FLUX)
     assert rms == pytest.approx(found.rms, rel=0.3 * SIZE)
     assert covered(bundle, found.rays[:, :2]).all()
@@ -274,15 +257,10 @@ def test_the_oracle_finds_what_is_recorded():
 )
 def test_light_at_the_end_of_an_arc_is_found(file, angle, path, flux, rms):
     """Flux and size are those of the oracle, by `confirm`, +-0.3 %."""
-    if not (CORPUS / file).exists():
-        pytest.skip(f"{CORPUS} is not there")
-    made = setup(load_lens(CORPUS / file), (0.0, angle), COATINGS["bare"])
-    found = dense_search(made, ghost_path(made.lens, *path), FIRST)
-    our_flux, our_rms, bundle = measured(made, ghost_path(made.lens, *path))
+    found, our_flux, our_rms, bundle = compared(CORPUS / file, (0.0, angle), "bare", path, FIRST)
     assert our_flux == pytest.approx(flux, rel=FLUX)
     assert our_rms == pytest.approx(rms, rel=SIZE)
-    light = found.rays[:, 2]
-    assert light @ covered(bundle, found.rays[:, :2]) > 0.999 * light.sum()
+    assert holds(bundle, found)
 
 
 @pytest.mark.parametrize(("angle", "path"), [(8.678, (4, 2)), (50.014, (9, 2))])
@@ -293,29 +271,17 @@ def test_a_ring_or_arc_thinner_than_the_coarsest_cells_is_whole(angle, path):
 
     The oracle has no aspheric terms; the dense search agrees with 6 million random rays in the ring's box within 0.2 %.
     """
-    if not (ASPHERES / ASPHERIC).exists():
-        pytest.skip(f"{ASPHERES} is not there")
-    made = setup(load_lens(ASPHERES / ASPHERIC), (0.0, angle), COATINGS["bare"])
-    path = ghost_path(made.lens, *path)
-    found = dense_search(made, path, SECOND)
-    flux, rms, bundle = measured(made, path)
+    found, flux, rms, bundle = compared(ASPHERES / ASPHERIC, (0.0, angle), "bare", path, SECOND)
     assert flux == pytest.approx(found.flux, rel=FLUX)
     assert rms == pytest.approx(found.rms, rel=SIZE)
-    light = found.rays[:, 2]
-    assert light @ covered(bundle, found.rays[:, :2]) > 0.999 * light.sum()
+    assert holds(bundle, found)
 
 
 def test_a_second_arc_is_found_where_a_gap_is_halved_beside_it():
     """13-0 of a zoom with aspheres: an arc 0.03 mm wide and 4 mm beside the other light, 4 % of the flux."""
-    if not (ASPHERES / LEICA_ZOOM).exists():
-        pytest.skip(f"{ASPHERES} is not there")
-    made = setup(load_lens(ASPHERES / LEICA_ZOOM), (0.0, 11.9378), COATINGS["bare"])
-    path = ghost_path(made.lens, 13, 0)
-    found = dense_search(made, path, FIRST)
-    flux, _, bundle = measured(made, path)
+    found, flux, _, bundle = compared(ASPHERES / LEICA_ZOOM, (0.0, 11.9378), "bare", (13, 0), FIRST)
     assert flux == pytest.approx(found.flux, rel=FLUX)
-    light = found.rays[:, 2]
-    assert light @ covered(bundle, found.rays[:, :2]) > 0.999 * light.sum()
+    assert holds(bundle, found)
 
 
 def test_a_second_arc_beside_a_region_of_few_cells_is_found():
@@ -323,16 +289,10 @@ def test_a_second_arc_beside_a_region_of_few_cells_is_found():
 
     Light passes beside it, so that the first scan, in cells of 1 mm, has no two rays that fail around it.
     """
-    if not (CORPUS / FAST_ZOOM).exists():
-        pytest.skip(f"{CORPUS} is not there")
-    made = setup(load_lens(CORPUS / FAST_ZOOM), (0.0, 41.57322), COATINGS["coated"])
-    path = ghost_path(made.lens, 31, 1)
-    found = dense_search(made, path, SECOND)
-    flux, rms, bundle = measured(made, path)
+    found, flux, rms, bundle = compared(CORPUS / FAST_ZOOM, (0.0, 41.57322), "coated", (31, 1), SECOND)
     assert flux == pytest.approx(found.flux, rel=0.3 * FLUX)
     assert rms == pytest.approx(found.rms, rel=SIZE)
-    light = found.rays[:, 2]
-    assert light @ covered(bundle, found.rays[:, :2]) > 0.999 * light.sum()
+    assert holds(bundle, found)
 
 
 def test_a_region_without_an_end_of_its_arc_is_widened(monkeypatch):
