@@ -95,14 +95,10 @@ def holds(bundle, found, part=0.999):
 )
 def test_light_of_a_small_region_is_whole(file, field, coating, path, flux, rms):
     """Flux and size as an outside tracer and the dense search find them."""
-    if not (CASES / file).exists():
-        pytest.skip(f"{CASES} is not there")
-    made = setup(load_lens(CASES / file), field, COATINGS[coating])
-    found = dense_search(made, ghost_path(made.lens, *path), SECOND)
+    found, our_flux, our_rms, bundle = compared(CASES / file, field, coating, path, SECOND)
     # first the two judges
     assert found is not None
     assert (found.flux, found.rms) == (pytest.approx(flux, rel=0.006), pytest.approx(rms, rel=0.006))
-    our_flux, our_rms, bundle = measured(made, ghost_path(made.lens, *path))
     assert our_flux == pytest.approx(flux, rel=FLUX)
     assert our_rms == pytest.approx(rms, rel=SIZE)
     assert covered(bundle, found.rays[:, :2]).mean() > 0.999
