@@ -15,6 +15,7 @@ pytest.importorskip("starlette", reason="the extra ui is not installed")
 pytest.importorskip("uvicorn", reason="the extra ui is not installed")
 
 from flarewright.cli.app import run
+from flarewright.editor.commands.lens import prescription
 from flarewright.editor.server.access import Access
 from flarewright.editor.server.app import _GET, _POST, SERVER, make_app
 from flarewright.editor.server.workspace import Workspace
@@ -129,6 +130,25 @@ def test_commands_undo_and_rejections(workspace):
     assert ask(workspace, "/api/thumbnail/lens/..%2f..%2fsecret")[0] in (400, 404)
     assert reported(workspace, "/api/thumbnail/lens/secret")[0] == 400
     assert reported(workspace, "/api/export/zip")[0] == 400
+
+
+def test_a_change_during_an_answer_is_newer_than_the_answer(workspace, monkeypatch):
+    """A state of before a change used to carry the number of after it, and stayed on the page."""
+    before = reported(workspace, "/api/state")[1]
+    session = workspace.session
+
+    def slowly(project):
+        if session.revision == before["revision"]:
+            session.do("move_light", {"light": 0, "x": 2.0, "y": 1.0})
+        return prescription(project)
+
+    monkeypatch.setattr("flarewright.editor.server.page_state.prescription", slowly)
+    meanwhile = reported(workspace, "/api/state")[1]
+    assert meanwhile["lights"] == before["lights"]
+    assert meanwhile["revision"] == before["revision"]
+    after = reported(workspace, "/api/state")[1]
+    assert after["lights"][0]["field_deg"] == [2.0, 1.0]
+    assert after["revision"] > before["revision"]
 
 
 def test_import_export_and_the_command(workspace, tmp_path):

@@ -36,10 +36,13 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
         Ready for JSON.
     """
     session = screen.session
+    # read before the parts, which another thread may change meanwhile: an older number is corrected by the next state,
+    # while older parts under a newer number would stay on the page
+    revision = session.revision
     project, history = session.project, session.history
     table = measured_facts(project) if is_measured(project) else prescription(project)
     return {
-        "revision": session.revision,
+        "revision": revision,
         "file": session.file,
         "opened": session.opened,
         "clean": session.clean,
