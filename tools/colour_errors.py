@@ -53,7 +53,9 @@ from flarewright.optics.lens.paths import LightPath, ghost_paths
 from flarewright.optics.rays.bundle import Refinement, trace_bundle, trace_grid
 from flarewright.optics.rays.pack import facing, resolve_coatings
 from flarewright.optics.rays.torn_cells import cut_failed_triangles
-from flarewright.render.ghosts.paraxial_ghosts import draft_colors, draw_draft, matrix_fluxes
+from flarewright.render.ghosts.draft_colors import draft_colors
+from flarewright.render.ghosts.matrix_flux import matrix_fluxes
+from flarewright.render.ghosts.paraxial_ghosts import draw_draft
 from flarewright.render.ghosts.traced_ghosts import find_final
 from flarewright.render.image.canvas import blank, merge
 from flarewright.render.render import render

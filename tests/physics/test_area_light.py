@@ -13,6 +13,7 @@ from flarewright.optics.colour.rgb import luminance_weights
 from flarewright.optics.pupil.light_shape import light_outline, parts
 from flarewright.optics.pupil.polygon import closed, points
 from flarewright.render.ghosts import extent_blur
+from flarewright.render.ghosts.draft_spread import spread_light
 from flarewright.render.ghosts.extent_blur import (
     blur_by_extent,
     extent_coverage,
@@ -20,7 +21,6 @@ from flarewright.render.ghosts.extent_blur import (
     spread_window,
     spread_within,
 )
-from flarewright.render.ghosts.paraxial_ghosts import spread_light
 from flarewright.render.render import render
 from flarewright.render.scene.area_lights import spread_border
 from flarewright.render.scene.opening import make_opening

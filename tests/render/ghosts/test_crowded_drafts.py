@@ -7,7 +7,7 @@ from flarewright.kernels.raster.polygons import sum_rows
 from flarewright.model import Art, Camera, Light, Output, Project, Quality, Rule
 from flarewright.optics.colour.rgb import luminance_weights
 from flarewright.optics.lens.paths import ghost_paths
-from flarewright.render.ghosts import draft_ghosts, paraxial_ghosts
+from flarewright.render.ghosts import draft_colors, draft_ghosts, matrix_flux, paraxial_ghosts
 from flarewright.render.render import render
 from flarewright.render.scene.opening import make_opening
 from flarewright.render.scene.resolve import resolve_project
@@ -55,7 +55,7 @@ def test_ghosts_are_weighed_as_they_are_drawn():
         paraxial_ghosts.draw_draft(shot, [path], picture)
         sum_rows(picture, picture)
         drawn[k] = luminance_weights(shot.colorspace) @ picture.sum(axis=(0, 1))
-    seen = paraxial_ghosts.weigh_drafts(shot, paths, paraxial_ghosts.draft_colors(shot, paths))
+    seen = matrix_flux.weigh_drafts(shot, paths, draft_colors.draft_colors(shot, paths))
     # the middle wavelength represents all, so cuts by edges or picture that depend on colour differ
     assert seen[:, 0].sum() == pytest.approx(drawn.sum(), rel=0.03)
     bright = (drawn > 1e-3 * drawn.max()) & (seen[:, 0] > 0.0)
@@ -68,8 +68,8 @@ def test_brightest_ghosts_keep_all_detail():
     settled = resolve_project(CANON)
     (shot,) = make_shots(settled, make_opening(settled, None))
     paths = ghost_paths(settled.lens)
-    details = paraxial_ghosts.draft_details((shot,), paths, [paraxial_ghosts.draft_colors(shot, paths)])[0]
-    brightness = paraxial_ghosts.weigh_drafts(shot, paths, paraxial_ghosts.draft_colors(shot, paths))[:, 1]
+    details = paraxial_ghosts.draft_details((shot,), paths, [draft_colors.draft_colors(shot, paths)])[0]
+    brightness = matrix_flux.weigh_drafts(shot, paths, draft_colors.draft_colors(shot, paths))[:, 1]
     assert set(details) == {0, 1, 2}
     # a ghost that is dark at the middle wavelength can be bright at others
     assert not details[brightness == 0.0].any()

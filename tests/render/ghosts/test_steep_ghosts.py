@@ -11,7 +11,7 @@ from flarewright.model import Camera, Light, Project, Quality
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.optics.rays.bundle import Refinement, trace_bundle, trace_grid
 from flarewright.optics.rays.path_reflectance import CURVE_NM
-from flarewright.render.ghosts.paraxial_ghosts import matrix_fluxes
+from flarewright.render.ghosts.matrix_flux import matrix_fluxes
 from flarewright.render.ghosts.steep_ghosts import (
     ABRUPT_PART,
     ends,

@@ -13,6 +13,9 @@ Modules:
 - `pupil_search`: `ghost_search`: search the accepted pupil of every path and light
 - `traced_ghosts`: `find_final`, `draw_final`, `draw_alone`: ghosts in final quality
 - `paraxial_ghosts`: `draw_draft` and others: ghosts in draft quality
+- `draft_colors`: `draft_colors`: their colours
+- `draft_spread`: `draft_alone`, `mark_spread`: those that are spread, ramped or blurred
+- `matrix_flux`: `matrix_fluxes`, `weigh_drafts`: their light, without drawing them
 - `steep_ghosts`: correct colours of ghosts whose throughput changes fast with wavelength
 - `wavelength_subset`: `gathered_weights`: draw faint ghosts at few wavelengths
 - `diffraction_rings`: `ringing_for`, `Rings`: diffraction patterns of the iris inside ghosts

@@ -18,19 +18,11 @@ from ..image.canvas import DETAILS, Plane
 from ..scene.area_lights import DRAFT_ROUNDING, halvings, motion, spread_border
 from ..scene.art_rules import PLAIN, PathArt
 from ..scene.shot import Shot
+from .draft_colors import draft_colors
+from .draft_spread import draft_alone, mark_spread, spread_light
 from .ghost_sums import GhostPass, GhostWork, chunks_of, sum_ghosts
-from .paraxial_ghosts import (
-    downsampled,
-    draft_alone,
-    draft_colors,
-    draft_details,
-    draw_draft,
-    draw_draft_by_detail,
-    draw_overridden_draft,
-    mark_spread,
-    matrix_fluxes,
-    spread_light,
-)
+from .matrix_flux import matrix_fluxes
+from .paraxial_ghosts import downsampled, draft_details, draw_draft, draw_draft_by_detail, draw_overridden_draft
 
 # groups of ghosts: they are drawn faster than another picture is added
 _MOST_CHUNKS = 2
