@@ -11,6 +11,8 @@ Python calls `trace_nodes` and `trace_hits` (`sequential`), `find_box` (`pupil_p
 - `general_lanes`: the same in lanes for surfaces of any shape and position
 - `general_ray`: one ray through surfaces of any shape and position
 - `pupil_prepass`: `find_box`, bounds of the accepted part of the pupil
+- `gap_search`: `search_gaps`, `search_axis`: light between the rays of the pre-pass
+- `ray_failures`: `passes`, `failure`, `rejected`: which rays pass, and how others fail
 - `samples`: `Samples`, the rays of the pre-pass
 - `grid_limits`: `GridLimits`, how far the adaptive grid is refined
 - `adaptive_grid`: `build_mesh`, a traced and triangulated quadtree over that part

@@ -5,7 +5,7 @@ import numpy as np
 from ..jit.decorators import borrowing, compiled, inlined, inner
 from .cell_neighbours import EMPTY, FLAT, LEAF, SPLIT, UNKNOWN, halve_neighbours, has_lit_side, known_level, quarter_of
 from .lens_arrays import at_wavelength
-from .pupil_prepass import rejected, stop_outside
+from .ray_failures import rejected, stop_outside
 from .sequential import ALIVE, REL, STOP_X, WEIGHT, X, Y, trace_lanes
 
 # why a cell is halved, in bits above those of its verdict: `REASON * k + SPLIT` for the k-th of `REASONS`

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..jit.decorators import borrowing, inner
-from .pupil_prepass import passes
+from .ray_failures import passes
 from .sequential import X, Y
 
 # states of a grid's cells; a FLAT leaf is drawn without the midpoints of its edges, a LEAF with them

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from ...kernels.tracing.gap_search import PROBES
 from ...kernels.tracing.incident_light import IncidentLight
 from ...kernels.tracing.intersect import AXES, ORIGIN, sag_of_shape
 from ...kernels.tracing.lens_arrays import LensArrays
 from ...kernels.tracing.path_steps import PathSteps
-from ...kernels.tracing.pupil_prepass import FEW_CELLS, PROBES, find_box
+from ...kernels.tracing.pupil_prepass import FEW_CELLS, find_box
 from ...kernels.tracing.sequential import STOP_X, trace_nodes
 from ...typing import Floats
 from ..lens.paths import LightPath, joined_path_steps
