@@ -1,4 +1,4 @@
-"""No folder holds more than 25 modules, and each package names its modules in its docstring."""
+"""No folder holds more than 25 modules; a package names its modules in its docstring, a module its package by dots."""
 
 from __future__ import annotations
 
@@ -56,3 +56,14 @@ def test_names_in_a_package_list_exist(folder):
         if not (folder / f"{name}.py").exists() and not any(re.search(rf"\b{name}\b", text) for text in texts)
     }
     assert missing == set()
+
+
+def test_modules_import_their_own_package_by_dots():
+    """One way to name a neighbour; `__main__` is also run as a file."""
+    named = []
+    for path in (ROOT / "src").rglob("*.py"):
+        for each in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            modules = [each.module] if isinstance(each, ast.ImportFrom) and not each.level else []
+            modules += [one.name for one in each.names] if isinstance(each, ast.Import) else []
+            named += [f"{path}: {one}" for one in modules if one and one.split(".")[0] == "flarewright"]
+    assert [one for one in named if "__main__.py" not in one] == []

@@ -10,7 +10,8 @@ import pytest
 from flarewright.kernels.diffraction.resample import SpikeTables, blend_blade_wings
 from flarewright.model import D65, Art, Camera, Iris, Light, Output, Project, Quality, Rule
 from flarewright.optics.colour.spectrum import band_weights
-from flarewright.optics.diffraction.fraunhofer import BladeWings, FanWings, pupil_pattern, spike_profile
+from flarewright.optics.diffraction.fraunhofer import BladeWings, FanWings, pupil_pattern
+from flarewright.optics.diffraction.spike_profile import spike_profile
 from flarewright.optics.pupil.iris import blade_edges, iris_outline
 from flarewright.render.render import render
 from flarewright.render.starburst.bands import BAND

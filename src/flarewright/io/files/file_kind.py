@@ -6,8 +6,7 @@ import re
 from pathlib import Path
 from typing import Any, Literal
 
-from flarewright.errors import FileError
-
+from ...errors import FileError
 from .door import outside
 
 FOREIGN_LENS_SUFFIXES = (".lens", ".zmx", ".seq", ".len", ".dat", ".csv")

@@ -26,8 +26,8 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from flarewright.errors import ProjectError, raised_as
-from flarewright.model import (
+from ...errors import ProjectError, raised_as
+from ...model import (
     AsLens,
     Bare,
     Coating,
@@ -41,9 +41,8 @@ from flarewright.model import (
     Stack,
     Standard,
 )
-from flarewright.model.lens.coating import STANDARD_NAMES
-from flarewright.model.project.project import CHOICES, everywhere
-
+from ...model.lens.coating import STANDARD_NAMES
+from ...model.project.project import CHOICES, everywhere
 from ...sentences import INVALID, did_you_mean, shorten, validation_sentences
 from ..files.text_file import read_toml
 from ..files.type_slips import record_of

@@ -11,8 +11,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from flarewright.model.lens.raw_lens import Configuration
-
+from ...model.lens.raw_lens import Configuration
 from ...sentences import shorten
 from .foreign_file import INFINITE, number_of
 

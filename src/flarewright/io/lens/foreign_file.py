@@ -9,10 +9,9 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
-from flarewright.errors import FileError, LensError
-from flarewright.model import Surface
-from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
-
+from ...errors import FileError, LensError
+from ...model import Surface
+from ...model.lens.raw_lens import RawSequence, SequenceRow
 from ...sentences import INVALID, summary, validation_sentences
 from ..files.door import sentences_for
 from ..files.text_file import read_bytes

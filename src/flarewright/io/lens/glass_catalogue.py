@@ -16,9 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from flarewright.errors import GlassError
-from flarewright.model import Dispersion
-
+from ...errors import GlassError
+from ...model import Dispersion
 from ...typing import Floats
 
 N_D_TOLERANCE = 0.002

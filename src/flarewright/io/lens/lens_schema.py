@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from flarewright.model import Iris
-
+from ...model import Iris
 from ...model.lens.coating import STANDARD_NAMES
 from .coating_text import HELP
 from .lens_fields import CURVATURE, RADIUS, ROW_NUMBERS, TOP_NUMBERS, TOP_TEXTS

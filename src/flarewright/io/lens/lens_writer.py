@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from flarewright.model import Coating, Lens, Row, Stop
-from flarewright.model.lens.iris import Iris
-
+from ...model import Coating, Lens, Row, Stop
+from ...model.lens.iris import Iris
 from ..files.atomic_write import write_text_atomically
 from .coating_text import UNCOATED, format_coating
 from .lens_fields import TOP_NUMBERS, TOP_TEXTS

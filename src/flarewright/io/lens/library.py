@@ -7,8 +7,7 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
-from flarewright.errors import LensError
-
+from ...errors import LensError
 from ..files.door import expanded
 from ..files.file_kind import LENS_SUFFIXES
 from .own.folder import key_of, own_lenses

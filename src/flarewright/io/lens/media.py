@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from flarewright.errors import GlassError
-from flarewright.model import Lens, Medium, Surface
-
+from ...errors import GlassError
+from ...model import Lens, Medium, Surface
 from . import glass_catalogue
 from .glass_catalogue import CatalogueGlass
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from flarewright.errors import GlassError
-from flarewright.model import Medium
-
+from ...errors import GlassError
+from ...model import Medium
 from . import media
 from .glass_catalogue import MAKERS
 from .lens_fields import ROW_NUMBERS

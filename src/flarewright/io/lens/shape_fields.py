@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from flarewright.model import Element, Figure, Position, Surface
-from flarewright.model.lens.figure import LARGEST_NM, MOST_NOLL
-from flarewright.model.lens.prescription import MOST_TERMS
-
+from ...model import Element, Figure, Position, Surface
+from ...model.lens.figure import LARGEST_NM, MOST_NOLL
+from ...model.lens.prescription import MOST_TERMS
 from ...sentences import INVALID, did_you_mean, shorten, validation_sentences
 from .lens_fields import CURVATURE, NumberField
 

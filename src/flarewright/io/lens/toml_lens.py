@@ -20,11 +20,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flarewright.errors import FileError, GlassError, LensError, ProjectError
-from flarewright.model import Coating, Iris, Lens, Row, Stop, Surface
-from flarewright.model.lens.prescription import NO_GLASS
-from flarewright.model.lens.raw_lens import LensReading, RawLens, RawSequence
-
+from ...errors import FileError, GlassError, LensError, ProjectError
+from ...model import Coating, Iris, Lens, Row, Stop, Surface
+from ...model.lens.prescription import NO_GLASS
+from ...model.lens.raw_lens import LensReading, RawLens, RawSequence
 from ...sentences import INVALID, count, shorten, summary, validation_sentences
 from ..files.door import shown
 from ..files.file_kind import OPTILAND_KEY, foreign_hint, lens_key, refuse_other_kind

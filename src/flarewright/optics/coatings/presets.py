@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flarewright.model.lens.coating import Film, StandardName
+from ...model.lens.coating import Film, StandardName
 
 MGF2, SIO2, AL2O3, ZRO2 = 1.38, 1.46, 1.63, 2.05
 """Typical indices of evaporated films near 550 nm (Macleod, Thin-Film Optical Filters, table of materials); processes

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flarewright.model import D65, Coating, Film
-
 from ...colorimetry import VISIBLE_NM
+from ...model import D65, Coating, Film
 from ...typing import Floats
 from ..colour.rgb import luminance_weights
 from ..colour.spectrum import band_weights

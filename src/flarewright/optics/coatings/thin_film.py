@@ -14,9 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flarewright.errors import FlarewrightError
-from flarewright.model.lens.coating import Bare, Coating, Film, QuarterWave, Standard
-
+from ...errors import FlarewrightError
+from ...model.lens.coating import Bare, Coating, Film, QuarterWave, Standard
 from ...typing import Floats
 from .presets import MGF2, standard_films
 

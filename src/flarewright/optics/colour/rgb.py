@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flarewright.model.project.camera import Colorspace
-
 from ...colorimetry import D65_WHITE, PRIMARIES, rgb_to_xyz, xyz_of
+from ...model.project.camera import Colorspace
 from ...typing import Floats
 
 _PRIMARIES = {"rec709": PRIMARIES["lin_rec709_scene"], "acescg": PRIMARIES["lin_ap1_scene"]}

@@ -7,11 +7,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flarewright.errors import FlarewrightError
-from flarewright.model.project.camera import Colorspace
-from flarewright.model.project.light import D65, BlackBody, EqualEnergy, Lines, Rgb, Spectrum
-
 from ...colorimetry import VISIBLE_NM
+from ...errors import FlarewrightError
+from ...model.project.camera import Colorspace
+from ...model.project.light import D65, BlackBody, EqualEnergy, Lines, Rgb, Spectrum
 from ...typing import Floats
 from .cie1931 import D65_POWER, TABLE_NM, cie_1931, cmf_at_1_nm
 from .rgb import xyz_to_rgb_matrix

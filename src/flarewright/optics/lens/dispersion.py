@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flarewright.errors import GlassError
-from flarewright.model import Dispersion, Medium
-
 from ...colorimetry import VISIBLE_NM
+from ...errors import GlassError
+from ...model import Dispersion, Medium
 from ...typing import Floats
 
 D_LINE_NM = 587.56

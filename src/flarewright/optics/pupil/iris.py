@@ -11,9 +11,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flarewright.model.lens.iris import Iris
-
 from ...kernels.diffraction.image_lines import sum_lines
+from ...model.lens.iris import Iris
 from ...typing import Floats, Pixels
 
 # lines of points that an image is read at together

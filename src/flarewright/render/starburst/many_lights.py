@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernels.diffraction import wings as kernel
-from ...optics.diffraction.fraunhofer import BladeWings, FanWings, Pattern, SpikeProfile, spike_profile
+from ...optics.diffraction.fraunhofer import BladeWings, FanWings, Pattern
+from ...optics.diffraction.spike_profile import SpikeProfile, spike_profile
 from ...typing import Floats, Indices, Pixels
 from .bands import BAND, in_threads
 from .pattern import NEAR_PIXELS, Painter, painter_of

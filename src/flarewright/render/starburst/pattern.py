@@ -13,11 +13,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flarewright.errors import ProjectError
-from flarewright.kernels.diffraction.resample import SpikeTables, blend_blade_wings, blend_fan_wings, deposit_core
-from flarewright.optics.diffraction.fraunhofer import BladeWings, FanWings, Pattern, spike_profile
-from flarewright.optics.pupil.dirt import VeilTerm
-
+from ...errors import ProjectError
+from ...kernels.diffraction.resample import SpikeTables, blend_blade_wings, blend_fan_wings, deposit_core
+from ...optics.diffraction.fraunhofer import BladeWings, FanWings, Pattern
+from ...optics.diffraction.spike_profile import spike_profile
+from ...optics.pupil.dirt import VeilTerm
 from ...typing import Floats, Pixels
 from .bands import BAND, in_threads
 

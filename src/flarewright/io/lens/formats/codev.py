@@ -16,9 +16,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from flarewright.model import Medium
-from flarewright.model.lens.raw_lens import Configuration, RawSequence, SequenceRow
-
+from ....model import Medium
+from ....model.lens.raw_lens import Configuration, RawSequence, SequenceRow
 from ....sentences import shorten
 from ...files.door import shown
 from .. import media

@@ -12,8 +12,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from flarewright.model.lens.raw_lens import Configuration
-
+from ....model.lens.raw_lens import Configuration
 from ....sentences import shorten
 from ..configuration_table import MOST, NOWHERE, Commands, Place, Stated, settings
 from ..foreign_file import number_of

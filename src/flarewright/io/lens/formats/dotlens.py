@@ -12,10 +12,9 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from flarewright.errors import LensError
-from flarewright.model import Medium
-from flarewright.model.lens.raw_lens import RawLens, RawRow
-
+from ....errors import LensError
+from ....model import Medium
+from ....model.lens.raw_lens import RawLens, RawRow
 from ....sentences import did_you_mean, shorten, summary
 from ...files.text_file import read_text
 from .. import media

@@ -16,11 +16,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from flarewright.errors import LensError
-from flarewright.model import Lens, Medium, Stop, Surface
-from flarewright.model.lens.prescription import MOST_TERMS
-from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
-
+from ....errors import LensError
+from ....model import Lens, Medium, Stop, Surface
+from ....model.lens.prescription import MOST_TERMS
+from ....model.lens.raw_lens import RawSequence, SequenceRow
 from ....sentences import shorten
 from ...files.door import sentences_for, shown
 from ...files.text_file import read_json

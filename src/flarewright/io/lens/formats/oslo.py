@@ -17,10 +17,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from flarewright.model import Medium
-from flarewright.model.lens.prescription import MOST_TERMS
-from flarewright.model.lens.raw_lens import Configuration, RawSequence, SequenceRow
-
+from ....model import Medium
+from ....model.lens.prescription import MOST_TERMS
+from ....model.lens.raw_lens import Configuration, RawSequence, SequenceRow
 from ....sentences import shorten
 from ...files.door import shown
 from .. import media

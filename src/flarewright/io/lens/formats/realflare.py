@@ -12,9 +12,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from flarewright.errors import LensError
-from flarewright.model.lens.raw_lens import RawSequence
-
+from ....errors import LensError
+from ....model.lens.raw_lens import RawSequence
 from ....sentences import shorten
 from ...files.text_file import read_json
 from ..foreign_file import json_number, lens_errors

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from flarewright.errors import LensError
-from flarewright.model.lens.prescription import LARGEST_F_NUMBER, LEAST_F_NUMBER
-from flarewright.model.lens.raw_lens import RawSequence, SequenceRow
-
+from ....errors import LensError
+from ....model.lens.prescription import LARGEST_F_NUMBER, LEAST_F_NUMBER
+from ....model.lens.raw_lens import RawSequence, SequenceRow
 from ....sentences import summary
 from ...files.door import shown
 from .. import media

@@ -8,9 +8,8 @@ from __future__ import annotations
 import csv
 import io
 
-from flarewright.errors import LensError
-from flarewright.model import Lens, Stop, Surface
-
+from ....errors import LensError
+from ....model import Lens, Stop, Surface
 from ..lens_writer import shortest_radius
 
 

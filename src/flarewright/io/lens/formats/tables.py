@@ -18,9 +18,8 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from flarewright.model.lens.prescription import MOST_TERMS
-from flarewright.model.lens.raw_lens import RawSequence
-
+from ....model.lens.prescription import MOST_TERMS
+from ....model.lens.raw_lens import RawSequence
 from ....sentences import did_you_mean, shorten
 from ...files.door import sentences_for
 from ...files.text_file import read_bytes

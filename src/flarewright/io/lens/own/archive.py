@@ -11,8 +11,7 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from zipfile import ZipFile, ZipInfo
 
-from flarewright.errors import FileError, FlarewrightError, LensError
-
+from ....errors import FileError, FlarewrightError, LensError
 from ...files.door import outside, printable, sentences_for, shown
 from ...files.file_kind import LENS_SUFFIXES
 from ...files.text_file import LARGEST, read_bytes

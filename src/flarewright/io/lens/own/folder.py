@@ -8,8 +8,7 @@ import unicodedata
 from collections.abc import Container
 from pathlib import Path
 
-from flarewright.errors import OutputError
-
+from ....errors import OutputError
 from ...files.state_folder import state_folder
 
 # Windows has devices of these names, whatever follows a point

@@ -9,8 +9,7 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from flarewright.errors import FileError
-
+from ....errors import FileError
 from ...files.atomic_write import write_text_atomically
 from ...files.text_file import read_json
 from .folder import library_folder

@@ -6,8 +6,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from flarewright.errors import ProjectError
-
+from ....errors import ProjectError
 from ....sentences import shorten
 from .record import LensRecord
 

@@ -8,8 +8,7 @@ Source: published files, and the OpticStudio help ("Multi-Configuration Operands
 
 from __future__ import annotations
 
-from flarewright.model.lens.raw_lens import Configuration
-
+from ....model.lens.raw_lens import Configuration
 from ..configuration_table import MOST, Commands, Place, Stated, settings
 from ..foreign_file import number_of
 from .keywords import IDLE_OPERANDS, RIM_OPERANDS

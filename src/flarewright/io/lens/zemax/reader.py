@@ -17,12 +17,11 @@ from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 
-from flarewright.colorimetry import VISIBLE_NM
-from flarewright.errors import GlassError
-from flarewright.model import Medium
-from flarewright.model.lens.prescription import MOST_TERMS
-from flarewright.model.lens.raw_lens import Configuration, RawSequence, SequenceRow
-
+from ....colorimetry import VISIBLE_NM
+from ....errors import GlassError
+from ....model import Medium
+from ....model.lens.prescription import MOST_TERMS
+from ....model.lens.raw_lens import Configuration, RawSequence, SequenceRow
 from ....sentences import did_you_mean, shorten
 from ...files.door import shown
 from .. import media

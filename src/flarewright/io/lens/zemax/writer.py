@@ -10,9 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from flarewright.errors import GlassError, LensError
-from flarewright.model import Lens, Medium, Stop, Surface
-
+from ....errors import GlassError, LensError
+from ....model import Lens, Medium, Stop, Surface
 from .. import glass_catalogue
 from ..glass_catalogue import F_D_C_UM
 
