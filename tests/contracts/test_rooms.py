@@ -58,6 +58,20 @@ def test_names_in_a_package_list_exist(folder):
     assert missing == set()
 
 
+@pytest.mark.parametrize("folder", ROOMS, ids=lambda folder: folder.relative_to(ROOT / "src").as_posix())
+def test_entry_points_of_a_package_exist(folder):
+    text = ast.get_docstring(ast.parse((folder / "__init__.py").read_text(encoding="utf-8"))) or ""
+    missing = {
+        f"{module}.{name}"
+        for module, name in re.findall(r"`(\w+)\.(\w+)`", text)
+        # `roots.json` is a file
+        if (folder / f"{module}.py").exists()
+        and not (folder / f"{module}.{name}").exists()
+        and not re.search(rf"^(?:(?:async )?def |class )?{name}\b", sources(folder, module), re.MULTILINE)
+    }
+    assert missing == set()
+
+
 def test_modules_import_their_own_package_by_dots():
     """One way to name a neighbour; `__main__` is also run as a file."""
     named = []

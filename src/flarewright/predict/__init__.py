@@ -10,10 +10,11 @@
 - `contrast`: `contrast` and `washed_share`, the loss of contrast
 - `occurrence`: `predict_occurrence` predicts the flare of one camera; `occurrence_data` as JSON
 - `occurrence_page`: `occurrence_page`, its HTML report
-- `photometry`: illuminance by lamps, and exposure of a sensor
+- `photometry`: illuminance by lamps; `exposure_level`, the signal of a sensor over its clipping level
 - `sun`: path and illuminance of the sun; `sky_direction`
 - `tracks`: positions of a scene's cameras and lights over time (`sightings`)
-- `plan`: `plan_scene` predicts the flare of a scene; `ranking` sorts its pairs of camera and light
+- `plan`: `plan_scene` predicts the flare of a scene; `ranking` sorts its pairs of camera and light, with
+  the signal of each over its clipping level
 - `switching`: `choose_cameras` chooses the camera with the least flare over time
 - `search`: `best_position` searches a camera position with less flare
 - `worst`: `render_worst` renders the worst moments

@@ -11,7 +11,7 @@ Public entry points: `viewport.Screen`, `drag.Drag`, `progressive_render.sharpen
 - `plate_view`: the plate under the flare, and the comp of both
 - `draft_match`: `Match`, the gains that match drafts to final pictures
 - `draft_calibration`: these gains as a function of the field angle
-- `ghost_picking`: the ghost table, ghosts under the pointer, outlines
-- `queries`: requests of the page to a screen: target picture, picking, outline
+- `ghost_picking`: `see`, every ghost drawn alone; `under`, those at a place
+- `queries`: requests of the page to a screen: `picked`, the ghosts of a click in their order; target picture, outline
 - `diagrams`: cross-section, coating charts, colour maps, library
 """

@@ -4,7 +4,7 @@
 - `cost`: misfit to targets, cost of extra ghosts: `irradiance_of_ghosts`, for kernels `total_cost`
 - `assignment`: `match`, ghosts to targets at least cost
 - `vignetting`: visibility of ghosts and its derivatives
-- `edge_thickness`: gaps at the edge of the axial beam: `beam_of`
+- `edge_thickness`: `edge_values`, by how much each edge is too thin; `beam_of`, the axial beam
 - `local_search`: `polish_many`, Levenberg-Marquardt on ghost targets; `limit_excess`
 - `picture_search`: `polish_by_picture`, damped Gauss-Newton on pictures; `draw_picture`
 - `arguments`: named tuples that the searches take: `LensStructure`, `FreeVariables`, `GhostAims`, `Effort`,

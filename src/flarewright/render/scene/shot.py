@@ -114,7 +114,7 @@ class Shot:
         wavelengths_nm : ndarray, shape (N,)
             The traced wavelengths, or wavelengths between them at which rays are interpolated.
         spectrum : PathSpectrum, optional
-            What the path passes; None: linear or cubic between the traced wavelengths, as `dense` tells.
+            What the path passes; None: linear or cubic between the traced wavelengths, by `dense`.
 
         Returns
         -------
