@@ -9,7 +9,7 @@ from oracle import trace
 from prescriptions import HELIAR, lens, system
 
 from flarewright.errors import ProjectError
-from flarewright.model import Camera, Iris, Light, Lines, Output, Project, Quality
+from flarewright.model import Camera, Iris, Light, Lines, Output, Project, Quality, Starburst
 from flarewright.optics.colour.rgb import luminance_weights
 from flarewright.optics.lens.dispersion import D_LINE_NM
 from flarewright.optics.lens.paraxial import first_order, path_matrices
@@ -221,3 +221,23 @@ def test_a_light_in_the_lens_is_refused():
         ghosts(hollow, (0.0, 0.0), distance=0.9 * sag)
     for near, whole in ((1.2 * sag, hollow), (0.9 * sag, a_lens)):
         shot_of(project(near, f_number=None).replace(lens=whole))
+
+
+@pytest.mark.parametrize("cats_eye", [False, True])
+def test_the_diffraction_pattern_grows_with_the_distance_of_the_image(cats_eye):
+    """At a magnification of one a lens works at twice its f-number (physics.md: x = u lambda z)."""
+    made = project(
+        200.0,
+        field=(0.0, 0.0),
+        f_number=32.0,
+        size=(161, 121),
+        camera={"focus_distance": 200.0, "sensor_mm": (0.23, 0.1729)},
+    )
+    made = made.replace(starburst=Starburst(cats_eye=cats_eye))
+    star = next(layer for layer in render(made).layers if layer.name == "starburst").pixels.sum(axis=2)
+    rows, columns = np.mgrid[:121, :161]
+    away = np.hypot(columns - 80, rows - 60) * 0.23 / 161
+    edges = np.arange(0.0, 0.07, 0.002)
+    profile = [star[(away >= low) & (away < low + 0.002)].mean() for low in edges]
+    first = next(k for k in range(1, len(profile) - 1) if profile[k] < profile[k + 1])
+    assert edges[first] + 0.001 == pytest.approx(1.2197 * 587.56e-6 * 32.0 * 2.0, rel=0.06)

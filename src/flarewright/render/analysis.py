@@ -18,7 +18,7 @@ from ..typing import Progress
 from .analysis_memory import AnalysisMemory, AnalysisPart
 from .image.partial_picture import digest_of
 from .progress_parts import progress_parts
-from .scene.resolve import build, check_opens, open_lens
+from .scene.resolve import build, check_opens, distance_from_front, open_lens
 
 # time of the search for paths of four reflections, and of the ghosts
 _WEIGHTS = {"search": 1.0, "ghosts": 9.0}
@@ -119,6 +119,8 @@ def ghosts(
         built.lens, f_number, sensor_distance=built.sensor_distance, focus_distance=built.focus_distance
     )
     sensor = SensorMirror(sensor_reflectance) if sensor_reflectance > 0.0 else None
+    if distance is not None:
+        distance = distance_from_front(distance, filter_plate, "distance")
     query = GhostQuery(field_deg, distance, wavelength_nm, paths, sensor, orders, order4_limit)
     table, found = find_ghosts(built.lens, order, built.coating, query, threads=threads)
     if remarks is not None:

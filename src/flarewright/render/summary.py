@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import groupby
-from math import isfinite, pi
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -50,18 +50,13 @@ def _scene_scale(settled: ResolvedProject, shot: Shot) -> float:
     Dividing layers by it gives the unit of the plate (docs/physics.md, "Radiometry"). Focused at infinity, r / d is
     1 / (2 N); it shrinks as the sensor moves away for a near focus plane.
     """
-    order = settled.order
     packed = shot.packed
     # rays along the axis meet every surface at normal incidence, the last entry of its table
     path, middle = direct_path(settled.lens), (len(packed.wavelengths_nm) - 1) // 2
     passed = 1.0 - packed.reflectance[middle, path.rows[path.actions == REFRACT], -1]
-    sensor_z = packed.sensor_z
-    slope = 0.5 / order.f_number
-    if isfinite(order.exit_pupil_z):
-        slope = 0.5 * order.exit_pupil_diameter / abs(sensor_z - order.exit_pupil_z)
     # a mask spans a square; the round opening is pi / 4 of it
     opened = shot.opening.mean_transmittance * (1.0 if shot.opening.mask is None else 4.0 / pi)
-    return float(pi * passed.prod() * opened * slope**2)
+    return float(pi * passed.prod() * opened * (0.5 / shot.working_f_number) ** 2)
 
 
 def _light_summary(project: Project, number: int, parts: list[tuple[Shot, DirectImage]]) -> dict[str, Any]:

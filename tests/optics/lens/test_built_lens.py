@@ -9,12 +9,26 @@ import pytest
 from prescriptions import HELIAR, ghost_table_of, lens
 
 from flarewright.errors import ProjectError
-from flarewright.model import Bare, Everywhere, Imperfection, Plate, Position, Surface
+from flarewright.model import (
+    Bare,
+    Camera,
+    Everywhere,
+    Imperfection,
+    Light,
+    Plate,
+    Position,
+    Project,
+    Quality,
+    Surface,
+)
 from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.optics.lens.tolerances import glass_groups
 from flarewright.render.analysis import ghosts
-from flarewright.render.scene.resolve import build, load_lens
+from flarewright.render.scene.direct_image import defocus_mm
+from flarewright.render.scene.opening import make_opening
+from flarewright.render.scene.resolve import build, load_lens, resolve_project
+from flarewright.render.scene.shots import make_shots
 
 FIELD = (3.0, 2.0)
 GLASS = Plate(thickness=2.0, gap=0.5, n_d=1.5, v_d=60.0)
@@ -279,3 +293,34 @@ def test_a_zoom_that_focuses_by_its_gaps_takes_both_at_once(heliar):
         build(zoom, focus_distance=2000.0)
     with pytest.raises(ProjectError, match="not for 300 mm"):
         build(zoom, zoom=efl, focus_distance=300.0)
+
+
+def test_a_cover_glass_may_lie_on_the_sensor(heliar):
+    """A gap of 0 used to count as none: the sensor was moved, or the lens refused."""
+    on, near = (build(heliar, cover_glass=GLASS.replace(gap=gap), sensor_distance=80.0).lens for gap in (0.0, 1e-4))
+    for one in (on, near):
+        order = first_order(one, 4.5)
+        assert sum(row.thickness for row in one.rows[len(heliar.rows) - 1 : -1]) + order.sensor_distance == (
+            pytest.approx(80.0, abs=2e-6)
+        )
+    # in focus too
+    assert first_order(build(heliar, cover_glass=GLASS.replace(gap=0.0)).lens, 4.5).sensor_distance < 1e-5
+
+
+@pytest.mark.parametrize("plate", [None, Plate(thickness=4.0, gap=20.0, n_d=1.5, v_d=60.0)])
+def test_a_light_in_the_plane_of_focus_is_sharp_behind_a_filter(plate):
+    """The plane in focus was measured from the filter and the light from the lens."""
+    made = Project(
+        lens="heliar-tronnier", f_number=8.0, filter=plate, camera=Camera(size_px=(320, 200), focus_distance=400.0),
+        lights=(Light(field_deg=(1.0, 0.5), distance=400.0),), quality=Quality(mode="draft", wavelengths=1),
+    )  # fmt: skip
+    settled = resolve_project(made)
+    (shot,) = make_shots(settled, make_opening(settled, None))
+    assert defocus_mm(settled.lens, shot) < 1e-6
+    beside = made.replace(lights=(made.lights[0].replace(distance=430.0),))
+    settled = resolve_project(beside)
+    assert defocus_mm(settled.lens, make_shots(settled, make_opening(settled, None))[0]) > 0.1
+    if plate is not None:
+        close = resolve_project(made.replace(lights=(made.lights[0].replace(distance=24.0),)))
+        with pytest.raises(ProjectError, match="stands in or behind the filter; give more than 24 mm"):
+            make_shots(close, make_opening(close, None))

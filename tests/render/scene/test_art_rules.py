@@ -481,3 +481,13 @@ def test_what_is_changed_is_said():
     art = PathArt(rgb=(1.0, 0.5, 0.0), offset=(1.0, -2.0), scale=2.0, blur=0.5, ramps=(((0.0, 1.0, 1.0, 1.0),),))
     for words in ("rgb gain 1,0.5,0", "offset 1,-2 mm", "scale 2", "blur 0.5 mm", "ramp 0,1,1,1"):
         assert words in art.text()
+
+
+def test_ghosts_of_a_near_light_are_ranked_at_its_distance():
+    """They used to be ranked as those of a distant light, unlike in the table of ghosts."""
+    near = project("draft", Rule(select="largest:3", gain=2.0), light=mono((10.0, 5.0)).replace(distance=150.0))
+    given = {"f_number": near.f_number, "coating": near.coating, "paths": near.quality.paths}
+    table = fw.ghosts("heliar-tronnier", (10.0, 5.0), distance=150.0, **given)
+    rows = sorted(table.ghosts, key=lambda row: -row.rms_radius_mm)[:3]
+    chosen = {name for name, art in resolve_art(resolve_project(near)).paths.items() if art.rgb[0] == 2.0}
+    assert chosen == {row.name for row in rows}

@@ -22,7 +22,7 @@ from flarewright.model import (
 )
 from flarewright.optics.rays.pack import resolve_coatings, rows_in_air
 from flarewright.render.scene.looks import demonstration, look_of, with_look
-from flarewright.render.scene.resolve import load_lens
+from flarewright.render.scene.resolve import load_lens, resolve_project
 
 TESSAR, TAKUMAR = "tessar-brendel", "takumar-50-f1.4"
 
@@ -147,3 +147,14 @@ def test_a_look_wider_than_the_lens_says_which_opening_is_used():
     assert remarks == (
         f"the look's f/{look.example.f_number:g} is wider than Heliar-Tronnier 100 mm f/3.5 opens: f/3.5",
     )
+
+
+def test_a_look_opens_a_zoom_as_far_as_its_position_does():
+    zoom = load_lens("canon-70-200")
+    slow = zoom.replace(positions=(*zoom.positions[:-1], zoom.positions[-1].replace(f_number=5.6)))
+    before = Project(lens=slow, zoom=zoom.positions[-1].name, lights=(Light(field_deg=(3.0, 1.0)),))
+    look, _ = look_of(rich().replace(f_number=4.0), "Fast")
+    after, remarks = with_look(before, look)
+    assert after.f_number == 5.6
+    assert any(remark.endswith("opens: f/5.6") for remark in remarks)
+    resolve_project(after)

@@ -145,7 +145,7 @@ def ghosts(options: GhostsOptions) -> None:
         project = _at_pixel(project, options)
     light, quality, reflectance = project.lights[0], project.quality, options.sensor_reflectance
     query = GhostQuery(
-        light.field_deg, light.distance, options.wavelength_nm, quality.paths,
+        light.field_deg, settled.light_distance(0), options.wavelength_nm, quality.paths,
         SensorMirror(reflectance) if reflectance > 0.0 else None, quality.orders, quality.order4_limit,
     )  # fmt: skip
     if options.sweep:

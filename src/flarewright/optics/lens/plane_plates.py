@@ -8,11 +8,18 @@ from .paraxial import first_order
 
 # default gaps between a filter and the first vertex, and between a cover glass and the sensor, mm
 FILTER_GAP, COVER_GAP = 5.0, 0.5
+# a sensor lies behind the last vertex: a cover glass on the sensor is a nanometre in front of it
+CEMENTED_GAP = 1e-6
 
 
 def _faces(plate: Plate, medium: Medium, behind: float) -> tuple[Surface, Surface]:
     front = Surface(thickness=plate.thickness, medium=medium, coating=plate.coating)
     return front, Surface(thickness=behind, coating=plate.coating)
+
+
+def filter_length(plate: Plate | None) -> float:
+    """Return the distance from the front of a filter to the first vertex of the lens, mm; 0 without one."""
+    return 0.0 if plate is None else plate.thickness + (FILTER_GAP if plate.gap is None else plate.gap)
 
 
 def with_filter(lens: Lens, plate: Plate, medium: Medium) -> Lens:
@@ -85,5 +92,8 @@ def with_cover_glass(
     faces = _faces(plate, medium, 0.0)
     presets = {name: (*rows, plate.coating, plate.coating) for name, rows in lens.coating_presets.items()}
     return lens.replace(
-        rows=(*lens.rows[:-1], last, *faces), coating_presets=presets, sensor_distance=gap or None, focus_distance=None
+        rows=(*lens.rows[:-1], last, *faces),
+        coating_presets=presets,
+        sensor_distance=max(gap, CEMENTED_GAP),
+        focus_distance=None,
     )

@@ -466,7 +466,7 @@ def _peak(
     return float(to_pixels(plane, side)[:, :, 0].max()) / patch**2, patch
 
 
-def bounding_edges(lens: Lens, order: FirstOrder, paths: Sequence[LightPath]) -> list[str]:
+def bounding_edges(lens: Lens, order: FirstOrder, paths: Sequence[LightPath], nearness: float = 0.0) -> list[str]:
     """Return the limiting aperture of each path's ghost as in `ghost_table`, without tracing.
 
     Parameters
@@ -476,13 +476,15 @@ def bounding_edges(lens: Lens, order: FirstOrder, paths: Sequence[LightPath]) ->
     order : FirstOrder
         At the opening and focus to be used.
     paths : sequence of LightPath
+    nearness : float
+        Slope per height of the light's rays on the plane of the first vertex, 1/mm; 0: a distant light.
 
     Returns
     -------
     list of {"stop", "entrance"}
     """
     packed = pack_lens(lens, order, (None,) * len(lens.rows), np.array([D_LINE_NM]))
-    return [_paraxial_facts(lens, packed, path)[0] for path in paths]
+    return [_paraxial_facts(lens, packed, path, nearness)[0] for path in paths]
 
 
 def _paraxial_facts(lens: Lens, packed: PackedLens, path: LightPath, nearness: float = 0.0) -> tuple[str, float | None]:

@@ -16,9 +16,11 @@ from ...model import Layer, Project
 from ...model.project.art import SELECTOR, Rule
 from ...optics.lens.paths import LightPath, ghost_paths
 from ...optics.lens.tolerances import ghost_offset
+from ...optics.rays.bundle import incidence
 from ...optics.rays.ghost_table import GhostQuery, GhostTable, bounding_edges, ghost_table, pack_for_query
+from ...optics.rays.pack import PackedLens
 from ...typing import Floats
-from .resolve import ResolvedProject
+from .resolve import ResolvedProject, distance_in_front
 
 Ramp = tuple[tuple[float, float, float, float], ...]
 
@@ -245,13 +247,24 @@ class _Facts:
     @cached_property
     def tables(self) -> list[GhostTable]:
         """The ghost analysis for every light."""
-        settled, quality = self.settled, self.settled.project.quality
+        settled, paths = self.settled, self.settled.project.quality.paths
         queries = [
-            GhostQuery(light.field_deg, paths=quality.paths, sensor=settled.sensor) for light in settled.project.lights
+            GhostQuery(light.field_deg, distance, paths=paths, sensor=settled.sensor)
+            for light, distance in zip(settled.project.lights, self.distances, strict=True)
         ]
-        # the queries have one wavelength and one sensor
-        packed = pack_for_query(settled.lens, settled.order, settled.coating, queries[0])
-        return [ghost_table(settled.lens, packed, query) for query in queries]
+        return [ghost_table(settled.lens, self.packed, query) for query in queries]
+
+    @cached_property
+    def packed(self) -> PackedLens:
+        """The lens at the one wavelength of the analysis."""
+        settled = self.settled
+        query = GhostQuery((0.0, 0.0), sensor=settled.sensor)
+        return pack_for_query(settled.lens, settled.order, settled.coating, query)
+
+    @cached_property
+    def distances(self) -> list[float | None]:
+        """The distance of each light from the first row, mm; None: infinite."""
+        return [distance_in_front(self.settled, self.packed, k) for k in range(len(self.settled.project.lights))]
 
     def may_be(self, name: str) -> bool:
         """Return whether a name that is not among the paths belongs to another number of reflections."""
@@ -282,10 +295,18 @@ class _Facts:
         return sorted(lit, key=lambda name: (-score[name], self.names.index(name)))
 
     @cached_property
-    def bounds(self) -> dict[str, str]:
-        """The edge that bounds each path."""
-        edges = bounding_edges(self.settled.lens, self.settled.order, self.paths)
-        return dict(zip(self.names, edges, strict=True))
+    def bounds(self) -> dict[str, set[str]]:
+        """The edges that bound each path's ghosts; those of near lights may differ."""
+        settled, found = self.settled, {name: set[str]() for name in self.names}
+        seen = [
+            incidence(light.field_deg, distance, settled.order.entrance_pupil_z)
+            for light, distance in zip(settled.project.lights, self.distances, strict=True)
+        ]
+        for nearness in {light.nearness / light.tilt_cosine for light in seen}:
+            edges = bounding_edges(settled.lens, settled.order, self.paths, nearness)
+            for name, edge in zip(self.names, edges, strict=True):
+                found[name].add(edge)
+        return found
 
 
 def _chosen(facts: _Facts, select: str, where: str) -> list[str]:
@@ -320,7 +341,7 @@ def _chosen(facts: _Facts, select: str, where: str) -> list[str]:
             )
         chosen = {path.name for path in facts.paths if row in path.mirrors}
     elif match["bounded"]:
-        chosen = {name for name, edge in facts.bounds.items() if edge == match["bounded"]}
+        chosen = {name for name, edges in facts.bounds.items() if match["bounded"] in edges}
     elif match["largest"] or match["brightest"]:
         kind = "largest" if match["largest"] else "brightest"
         chosen = set(facts.ranked(kind)[: int(match[kind])])

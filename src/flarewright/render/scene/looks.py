@@ -11,6 +11,7 @@ from ...io.project.look_file import read_look
 from ...model import Art, Bare, Camera, Everywhere, InTurn, Iris, Light, Look, Preset, Project
 from ...model.project.look import CAMERA_KEYS, LIGHT_KEYS
 from ...model.project.project import AsLens, CoatingChoice
+from ...optics.lens.zoom import positioned
 from ...optics.rays.pack import preset_names, resolve_coatings, rows_in_air
 from ...sentences import INVALID, validation_sentences
 from .photographic_defaults import as_photographed
@@ -48,7 +49,8 @@ def with_look(project: Project, look: Look | str | PathLike[str]) -> tuple[Proje
         if section == "coating":
             changes["coating"] = look.example.coating if same_lens else _transferred_coating(look.example, project)
         elif section == "f_number" and look.example.f_number is not None:
-            lens = open_lens(project.lens).lens
+            # a zoom may open less at its long end
+            lens = positioned(open_lens(project.lens).lens, project.zoom, project.camera.focus_distance)
             changes["f_number"] = max(look.example.f_number, lens.f_number)
             if look.example.f_number < lens.f_number:
                 remarks.append(

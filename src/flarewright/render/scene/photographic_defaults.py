@@ -10,6 +10,7 @@ from collections.abc import Set as AbstractSet
 
 from ...io.lens.library import in_library, lens_path
 from ...model import Iris, Lens, Light, Preset, Project
+from ...optics.lens.zoom import positioned
 from ...optics.pupil.light_shape import disc_fits
 from ...optics.rays.pack import PERIOD, STAGGERED
 from .resolve import open_lens
@@ -60,7 +61,9 @@ def as_photographed(project: Project, said: AbstractSet[str] = frozenset()) -> t
     lens, chosen = open_lens(project.lens).lens, []
     changes: dict[str, object] = {}
     if "f_number" not in said:
-        changes["f_number"] = stopped_down(lens.f_number)
+        # a zoom may open less at its long end
+        at_zoom = positioned(lens, project.zoom, project.camera.focus_distance)
+        changes["f_number"] = stopped_down(at_zoom.f_number)
         chosen.append(f"f/{changes['f_number']:g}")
     if "coating" not in said:
         preset = plausible_preset(lens)

@@ -18,13 +18,14 @@ from ...io.lens.toml_lens import read_lens
 from ...model import AsLens, CoatingChoice, Imperfection, Iris, Lens, Medium, Plate, Project, Surface
 from ...model.lens.raw_lens import LensReading, RawLens, RawSequence
 from ...optics.lens.paraxial import FirstOrder, first_order
-from ...optics.lens.plane_plates import with_cover_glass, with_filter
+from ...optics.lens.plane_plates import filter_length, with_cover_glass, with_filter
 from ...optics.lens.tolerances import imperfect
 from ...optics.lens.zoom import at_position, positioned
 from ...optics.lens_import.patent_repair import RIM_CUT, Apertures, axial_opening, repair
 from ...optics.lens_import.semi_diameters import with_semi_diameters
 from ...optics.lens_import.sequential_import import lens_of_sequence
-from ...optics.rays.pack import SensorMirror, resolve_coatings
+from ...optics.rays.bundle import least_distance
+from ...optics.rays.pack import PackedLens, SensorMirror, resolve_coatings
 from ...sentences import INVALID, summary, validation_sentences
 
 if TYPE_CHECKING:
@@ -321,7 +322,7 @@ def _behind_filter(
 ) -> tuple[Lens, float | None]:
     """Add a filter in front; the focus plane stays in place, so its distance from the new first vertex shrinks."""
     found = with_filter(lens, plate, _medium(plate, "filter", remarks))
-    ahead = found.rows[0].thickness + found.rows[1].thickness
+    ahead = filter_length(plate)
     remarks.append("the filter is rows 0 and 1; the lens' own rows begin at 2")
     for stated in (focus_distance, found.focus_distance):
         if stated is not None and stated <= ahead:
@@ -376,6 +377,54 @@ class ResolvedProject:
         if camera.sensor_reflectance == 0.0:
             return None
         return SensorMirror(camera.sensor_reflectance, 0.5 * hypot(*camera.sensor))
+
+    def light_distance(self, number: int) -> float | None:
+        """Return the distance of a light from the first row, mm; None: infinite.
+
+        The project states it from the first vertex of the lens itself, in front of which a filter may stand.
+
+        Raises
+        ------
+        ProjectError
+            When the light stands in or behind the filter.
+        """
+        stated, what = self.project.lights[number].distance, f"lights[{number}].distance"
+        return None if stated is None else distance_from_front(stated, self.project.filter, what)
+
+
+def distance_from_front(stated: float, plate: Plate | None, what: str) -> float:
+    """Return the distance of a light from the front of a filter, mm; the stated one is from the lens behind it.
+
+    Raises
+    ------
+    ProjectError
+        When the light stands in or behind the filter; `what` is at fault.
+    """
+    ahead = filter_length(plate)
+    if plate is not None and stated <= ahead:
+        raise ProjectError(
+            f"{what}: a light at {stated:g} mm stands in or behind the filter; give more than {ahead:g} mm"
+        )
+    return stated - ahead
+
+
+def distance_in_front(settled: ResolvedProject, packed: PackedLens, number: int) -> float | None:
+    """Return the distance of a light from the first row, mm; None: infinite.
+
+    Raises
+    ------
+    ProjectError
+        When the light stands in the lens, in its filter, or behind its entrance pupil.
+    """
+    distance = settled.light_distance(number)
+    least = least_distance(packed)
+    if distance is not None and distance <= least:
+        ahead = filter_length(settled.project.filter)
+        raise ProjectError(
+            f"lights[{number}].distance: a light at {distance + ahead:g} mm stands in the lens {settled.lens.name} or "
+            f"behind its entrance pupil; give more than {least + ahead:.4g} mm"
+        )
+    return distance
 
 
 def resolve_project(project: Project) -> ResolvedProject:

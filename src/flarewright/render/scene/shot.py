@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from math import isfinite
 from typing import Any, Protocol
 
 import numpy as np
@@ -99,6 +100,18 @@ class Shot:
     def gain(self) -> float:
         """Irradiance at the plane of the first vertex."""
         return self.light.intensity * self.incidence.cosine
+
+    @property
+    def working_f_number(self) -> float:
+        """Distance of the sensor from the exit pupil over its diameter: at infinity the f-number, larger at near focus.
+
+        The cone of light behind the lens has this ratio, so it sets the exposure and the size of the diffraction
+        pattern (docs/physics.md, "Radiometry").
+        """
+        order = self.packed.first_order
+        if not isfinite(order.exit_pupil_z):
+            return order.f_number
+        return abs(self.packed.sensor_z - order.exit_pupil_z) / order.exit_pupil_diameter
 
     @property
     def view_radius(self) -> float:

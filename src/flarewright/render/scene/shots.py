@@ -7,18 +7,17 @@ from math import ceil
 
 import numpy as np
 
-from ...errors import ProjectError
 from ...model import Light, Project, Quality
 from ...optics.colour.spectrum import covers_all_lines, sampled_wavelengths, traced_wavelengths
 from ...optics.pupil.light_shape import parts
 from ...optics.pupil.polygon import closed
-from ...optics.rays.bundle import Incidence, incidence, least_distance
+from ...optics.rays.bundle import Incidence, incidence
 from ...optics.rays.pack import PackedLens, facing, resolve_coatings
 from ...optics.rays.path_reflectance import BandCurves, coating_curves
 from .between_wavelengths import Between, lens_between
 from .holdout import read_plates, seen_part
 from .opening import Opening
-from .resolve import ResolvedProject
+from .resolve import ResolvedProject, distance_in_front
 from .shot import Shot
 
 DRAFT_PARTS = 4
@@ -66,10 +65,12 @@ def make_shots(settled: ResolvedProject, opening: Opening, *, sampled: bool = Fa
             packs[key] = *between.packed_at(wavelengths_nm), between if steep else None
         of_light, bands, between_them = packs[key]
         whole = []
+        distance = distance_in_front(settled, of_light, number)
         for part in parts(light, quality.source_step_deg, most_parts(quality)):
             changes = {"field_deg": part.field_deg, "intensity": light.intensity * part.share, "holdout": None}
             point = light.replace(**changes, diameter_deg=0.0, shape=None) if light.extended else light
-            seen = _seen(settled, of_light, number, point)
+            point = point if distance == light.distance else point.replace(distance=distance)
+            seen = _seen(settled, point)
             packed = facing(of_light, seen.axes, seen.nearness)
             whole.append(
                 Shot(
@@ -115,14 +116,8 @@ def _unhidden(settled: ResolvedProject, light: Light, whole: list[Shot]) -> list
     return seen or [replace(whole[0], light=whole[0].light.replace(intensity=0.0), share=0.0, border=None)]
 
 
-def _seen(settled: ResolvedProject, packed: PackedLens, number: int, light: Light) -> Incidence:
-    """Return a light's incidence; raise an error if the light is inside the lens."""
+def _seen(settled: ResolvedProject, light: Light) -> Incidence:
+    """Return the incidence of a light, whose distance is from the first row."""
     if light.distance is None:
         return incidence(light.field_deg)
-    least = least_distance(packed)
-    if light.distance <= least:
-        raise ProjectError(
-            f"lights[{number}].distance: a light at {light.distance:g} mm stands in the lens {settled.lens.name} or "
-            f"behind its entrance pupil; give more than {least:.4g} mm"
-        )
     return incidence(light.field_deg, light.distance, settled.order.entrance_pupil_z)

@@ -153,7 +153,7 @@ def _many_lights(scene: _Scene, group: list[tuple[Shot, DirectImage]], threads: 
     flux = direct_flux([lit for lit, _ in group], scene.settled.lens, throughputs, fine_nm)
     colors = np.array([lit.weights(fine_nm) for lit, _ in group]) * flux[:, :, None]
     chosen, gains, fits = basis_spectra(colors, max(1, len(group) // LIGHTS_PER_SPECTRUM))
-    f_number = scene.settled.order.f_number * scene.look.size
+    f_number = shot.working_f_number * scene.look.size
     strength = scene.look.intensity * pattern.transmittance
     pixel = (1.0 / float(pixels[2]), 1.0 / float(pixels[3]))
     draft = scene.settled.project.quality.mode == "draft"
@@ -186,7 +186,8 @@ def _one_light(
     pixel = (1.0 / float(shot.to_pixels[2]), 1.0 / float(shot.to_pixels[3]))
     column = float(shot.to_pixels[0] + image.position_mm[0] * shot.to_pixels[2])
     row = float(shot.to_pixels[1] - image.position_mm[1] * shot.to_pixels[3])
-    order = scene.settled.order
+    # a traced pupil has the size that the sensor sees, in units of the lens' f-number
+    f_number = scene.settled.order.f_number if scene.look.cats_eye else shot.working_f_number
     # the pattern is centred on a pixel; the kernel contains the shift within that pixel
     middle = (math.floor(column) + 0.5, math.floor(row) + 0.5)
     kernel = _kernel(scene, parts, (shot, image), (column - middle[0], row - middle[1]))
@@ -209,7 +210,7 @@ def _one_light(
             pattern = replace(pattern, wings=replace(pattern.wings, half_fan=half_fan))
         drawn = starburst_layer(
             pattern,
-            order.f_number * scene.look.size * math.exp(float(turn)),
+            f_number * scene.look.size * math.exp(float(turn)),
             pixel,
             size,
             (column + margin[0], row + margin[1]),
