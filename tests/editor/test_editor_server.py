@@ -6,6 +6,7 @@ import threading
 import time
 import urllib.error
 import urllib.request
+from dataclasses import replace
 from pathlib import Path
 from socket import SO_LINGER, SOL_SOCKET
 
@@ -172,6 +173,11 @@ def test_import_export_and_the_command(workspace, tmp_path):
     table = ask(workspace, "/api/export/csv")[1].decode().splitlines()
     assert table[0].startswith("ghost,flux_mm2")
     assert len(table) == 1 + len(workspace.screen.seen.ghosts)
+    # the table of another lens is not that of this one
+    seen = workspace.screen.seen
+    workspace.screen.seen = replace(seen, project=seen.project.replace(lens="takumar-50-f1.4"))
+    code, answer = reported(workspace, "/api/export/csv")
+    assert (code, "still being measured" in answer["error"]) == (400, True)
 
 
 def test_a_missing_background_is_reported(workspace, tmp_path):

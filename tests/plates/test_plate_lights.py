@@ -224,3 +224,17 @@ def test_expanded_highlights_invert_a_shoulder():
     # a plate of high dynamic range clips above 1
     above = expanded(np.array([0.01, 3.77, 5.0], np.float32), 80.0, 3.77)
     assert above == pytest.approx([0.01, 80.0, 80.0], rel=0.01)
+
+
+def test_a_group_of_joined_lamps_is_not_the_sun(lens):
+    """It can hold more light than the brightest single source, at a place where none is."""
+    _, _, directions, _ = lens
+    glitter = [(12 + 3 * k, 28, 1.0, 1.1) for k in range(14)]
+    found = follow([1], [find_sources(plate((32, 8, 1.0, 1.2), *glitter), 1.0)], SIZE[0])
+    limited, _, number = joined(found, 3)
+    assert number > 0
+    tracks = plate_tracks(limited, SIZE, joined=number, known=parse_source("sun"), white=0.9, clips_at=1.0)
+    lights, _ = lights_at(tracks, 1, directions, 1.0, SIZE)
+    sun = max(lights, key=lambda light: light.intensity)
+    assert sun.starburst
+    assert sun.intensity == pytest.approx(pi * 0.9)

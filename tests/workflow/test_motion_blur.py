@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from flarewright import Camera, Layer, Light, Project, ghosts
+from flarewright.render.scene.resolve import resolve_project
 from flarewright.workflow.motion_blur import MOST_SUBFRAMES, mean_layers, motion_px, subframe_count, subframe_times
 
 SIZE = (48, 32)
@@ -74,3 +75,15 @@ def test_the_count_follows_the_motion():
     few, many = (subframe_count([at(3.0), at(3.0 + step)]) for step in (0.1, 0.2))
     assert many == pytest.approx(2 * few, abs=2)
     assert subframe_count([at(-15.0), at(0.0), at(15.0)]) == MOST_SUBFRAMES
+
+
+def test_a_desqueezed_picture_moves_as_many_pixels_down_as_a_squeezed_one():
+    way = []
+    for desqueeze in (False, True):
+        camera = Camera(size_px=(240, 160), desqueeze=desqueeze)
+        made = [
+            Project(lens="anamorphic-heliar-2x", f_number=8, lights=[Light(field_deg=(0.01, y))], camera=camera)
+            for y in (1.0, 1.2)
+        ]  # fmt: skip
+        way.append(motion_px(made) * resolve_project(made[0]).project.camera.sensor[1] / 160)
+    assert way[1] == pytest.approx(way[0], rel=0.02)

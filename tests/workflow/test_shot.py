@@ -318,3 +318,14 @@ def test_an_unreadable_file_is_found_before_the_first_frame(kind, tmp_path):
         with pytest.raises(FlarewrightError, match=r"h\.2\.exr cannot be read as"):
             shot(project(**changes), tmp_path / "f.#.exr", processes=1, prepare=too_late)
     assert not list(tmp_path.glob("f.*"))
+
+
+def test_a_sequence_needs_only_the_frames_that_are_drawn(tmp_path):
+    """Its first frame used to be opened as well, because a curve has a key at 0 s."""
+    for frame in (3, 4):
+        matte = Layer("beauty", np.ones((36, 64, 3), np.float32), (0, 0, 64, 36), {})
+        write_exr(tmp_path / f"h.{frame}.exr", [matte], (64, 36))
+    given = project(holdout=Holdout(image=str(tmp_path / "h.#.exr")))
+    assert any(0.0 in curve.at_s for curve in given.curves)
+    result = shot(given, tmp_path / "f.#.exr", frames="3-4", processes=1)
+    assert [one.frame for one in result.frames] == [3, 4]

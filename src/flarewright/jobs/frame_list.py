@@ -164,9 +164,9 @@ class FramePattern:
             raise ProjectError(
                 f"{self.text}: the folder {path.parent} cannot be read ({(error.strerror or str(error)).lower()})"
             ) from None
-        numbers = {int(match[1]) for match in matches if match}
+        there = {match[0]: int(match[1]) for match in matches if match}
         # other files can have as many digits
-        return tuple(sorted(number for number in numbers if self.path(number).name in {m[0] for m in matches if m}))
+        return tuple(sorted({number for number in there.values() if self.path(number).name in there}))
 
     def found(self) -> tuple[int, ...]:
         """Return the frames as `on_disk` does; raises ProjectError if there is none."""

@@ -114,7 +114,9 @@ def plate_tracks(
             chosen = tracks.peak.max(axis=1) >= clips_at
         chosen[len(tracks) - joined :] = False
         if not chosen.any():
-            chosen[int(np.argmax(bright.max(axis=1)))] = True
+            # a group is brighter than any of its lamps
+            single = len(tracks) - joined or len(tracks)
+            chosen[int(np.argmax(bright[:single].max(axis=1)))] = True
         named[chosen] = bright[chosen] / np.maximum(bright[chosen].max(axis=1, keepdims=True), 1e-300)
     is_round = wide < _ROUND * narrow
     narrowest = max(_POINT_PART * size_px[0], _POINT_PX) if point_px is None else point_px

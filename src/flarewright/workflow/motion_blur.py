@@ -114,10 +114,10 @@ def _ghosts(project: Project) -> _Places:
     opening = make_opening(settled, None)
     found: _Places = {}
     for k, shot in enumerate(make_shots(settled, opening)):
-        scale = abs(float(shot.to_pixels[2]))
+        scale = np.abs(shot.to_pixels[2:])
         for number, path in enumerate(paths):
             frame = ghost_frame(shot, path)
-            (x, y), radius = np.array(frame.centre) * scale, frame.radius * scale
+            (x, y), radius = np.array(frame.centre) * scale, frame.radius * float(scale.max())
             inside = max(abs(x) - 0.5 * width, abs(y) - 0.5 * height) < radius
             if np.isfinite(x + y + radius) and (inside or number == 0):
                 found[k, str(number)] = (float(x), float(y), float(radius))

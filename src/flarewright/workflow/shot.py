@@ -467,15 +467,16 @@ def _check_moments(plan: ShotPlan, frames: Sequence[int]) -> None:
     from .shot_frame import frame_project
 
     project = plan.project
-    times = {time_of(frames[0], project.timeline), time_of(frames[-1], project.timeline)}
+    first = time_of(frames[0], project.timeline)
+    times = {first, time_of(frames[-1], project.timeline)}
     times |= {at_s for curve in project.curves for at_s in curve.at_s}
-    for number, at_s in enumerate(sorted(times)):
+    for at_s in sorted(times):
         moment = frame_project(plan, at_s)
         try:
             if is_measured(moment):
                 continue
-            # the files of one moment stand for those of all; frames of sequences are checked by their headers
-            if number == 0:
+            # the files of a drawn frame stand for those of all; frames of sequences are checked by their headers
+            if at_s == first:
                 open_project_files("the project", moment)
             else:
                 resolve_project(moment)

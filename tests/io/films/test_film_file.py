@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 import sys
 
 import numpy as np
@@ -125,3 +126,21 @@ def test_without_pyav_a_sentence_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(FileError, match=r"pip install 'flarewright\[video\]', or give an image sequence"):
         av_module("drive.mp4")
+
+
+def test_a_trimmed_film_is_whole(films, tmp_path):
+    """Its header counts the frames that it stores and does not show; it used to be called cut short."""
+    data = bytearray((films / "a.mp4").read_bytes())
+    # the edit list: its segment begins half a second into the media
+    at = data.index(b"elst")
+    (entries,) = struct.unpack(">I", data[at + 8 : at + 12])
+    assert entries == 1
+    long, begins, rate = struct.unpack(">IiI", data[at + 12 : at + 24])
+    scale = struct.unpack(">I", data[(mdhd := data.index(b"mdhd")) + 16 : mdhd + 20])[0]
+    movie = struct.unpack(">I", data[(mvhd := data.index(b"mvhd")) + 16 : mvhd + 20])[0]
+    data[at + 12 : at + 24] = struct.pack(">IiI", long - movie // 2, begins + scale // 2, rate)
+    path = tmp_path / "trimmed.mp4"
+    path.write_bytes(data)
+    film = open_film(path)
+    with av.open(str(path)) as container:
+        assert film.frames == sum(1 for _ in container.decode(video=0)) == 36

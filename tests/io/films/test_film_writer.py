@@ -107,3 +107,15 @@ def test_a_full_disk_gets_a_sentence(tmp_path):
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
         signal.signal(signal.SIGXFSZ, handler)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("step", [2, 5])
+def test_parts_whose_frames_lie_farther_apart_can_be_joined(tmp_path, step):
+    """A part used to begin to decode before the previous one had ended, which no container holds."""
+    write_film(tmp_path / "a.mp4", enumerate(PICTURES[:24]), SIZE, RATE, comment="part")
+    later = [(step * k, each) for k, each in enumerate(PICTURES[24:])]
+    write_film(tmp_path / "b.mp4", later, SIZE, RATE, comment="part")
+    join_films(tmp_path / "f.mp4", [(0, tmp_path / "a.mp4"), (25, tmp_path / "b.mp4")], RATE)
+    with av.open(str(tmp_path / "f.mp4")) as container:
+        times = [float(frame.time * RATE) for frame in container.decode(video=0)]
+    assert times == pytest.approx([*range(24), *(25 + moment for moment, _ in later)], abs=0.01)

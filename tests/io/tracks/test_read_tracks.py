@@ -189,6 +189,8 @@ def test_tables_have_intensity_colour_names_and_another_corner(read):
         ("{curve x1 {parent.a}} {curve x1 2}", None, "has an expression"),
         ("{curve x1 5 nan 7} {curve x1 5 6 7}", None, "'nan' is no number for a value"),
         ("{" * 100, "nuke", "more than 40 braces"),
+        ('{curve x1 10 ""} {curve x1 2}', "nuke", "'' is no number for a value"),
+        (f"frame,x,y\n1,2,{'3' * 200_000}\n", "csv", "line 2 is no line of a table; write frame,x,y"),
         (
             "Adobe After Effects 8.0 Keyframe Data\n\nTransform\tScale\n\tFrame\tX percent\n\t0\t5\n",
             None,

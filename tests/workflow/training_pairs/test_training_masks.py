@@ -17,7 +17,7 @@ def disc(number, place, radius):
 
 def test_the_area_and_the_radiance_of_a_disc_hold_its_irradiance():
     light = Light(field_deg=(0.0, 0.0), intensity=3.0, diameter_deg=2.0, spectrum=BlackBody(temperature_k=4000.0))
-    found = light_image(light, 1, (0.1, -0.2), 100.0, (800, 600), (24.0, 18.0))
+    found = light_image(light, 1, (0.1, -0.2), (100.0, 100.0), (800, 600), (24.0, 18.0))
     assert found.place_px == pytest.approx((400.0 + 0.1 * 800 / 24, 300.0 + 0.2 * 600 / 18))
     _, cover = found.coverage((800, 600))
     radians = np.radians(2.0)
@@ -28,8 +28,22 @@ def test_the_area_and_the_radiance_of_a_disc_hold_its_irradiance():
     assert found.radiance[0] > found.radiance[2]
 
 
+def test_a_squeezed_picture_shows_an_oval():
+    light = Light(field_deg=(0.0, 0.0), intensity=3.0, diameter_deg=2.0)
+    found = light_image(light, 1, (0.0, 0.0), (25.0, 50.0), (400, 300), (24.0, 18.0))
+    _, cover = found.coverage((400, 300))
+    down = 50.0 * np.tan(np.radians(1.0)) * 300 / 18.0
+    assert cover.sum() == pytest.approx(0.5 * np.pi * down**2, rel=0.01)
+    assert (cover.sum(axis=1) > 0.5).sum() == pytest.approx(2.0 * down, abs=1.5)
+    assert (cover.sum(axis=0) > 0.5).sum() == pytest.approx(down, abs=1.5)
+    mask = light_mask([found], np.zeros((300, 400, 3), np.float32))
+    assert np.count_nonzero(mask) == pytest.approx(0.5 * np.pi * down**2, rel=0.03)
+    round_one = light_image(light, 1, (0.0, 0.0), (50.0, 50.0), (400, 300), (24.0, 18.0))
+    np.testing.assert_allclose(found.radiance, round_one.radiance, rtol=1e-12)
+
+
 def test_a_point_covers_one_pixel_and_a_light_outside_none():
-    point = light_image(Light(field_deg=(0.0, 0.0)), 1, (0.0, 0.0), 50.0, SIZE, (24.0, 18.0))
+    point = light_image(Light(field_deg=(0.0, 0.0)), 1, (0.0, 0.0), (50.0, 50.0), SIZE, (24.0, 18.0))
     assert np.pi * point.radius_px**2 == pytest.approx(1.0, rel=1e-3)
     black = np.zeros((30, 40, 3), np.float32)
     assert np.count_nonzero(light_mask([disc(1, (10.5, 7.5), point.radius_px)], black)) == 1

@@ -276,3 +276,15 @@ def test_the_layout_of_flare7k(tmp_path):
         colours = {tuple(colour) for colour in np.asarray(Image.open(path)).reshape(-1, 3).tolist()}
         assert colours <= {(0, 0, 0), (255, 0, 0), (255, 255, 0), (0, 0, 255)}
         assert (0, 0, 255) in colours
+
+
+def test_machines_that_start_together_share_the_folder(tmp_path):
+    """The unfinished description of another machine used to make the folder a foreign one."""
+    folder = tmp_path / "pairs"
+    folder.mkdir()
+    (folder / ".dataset.x1y2.part.json").write_text("{")
+    assert dataset(spec_of(), folder, items=2, processes=1, threads=1).drawn == 2
+    (folder.parent / "other").mkdir()
+    (folder.parent / "other" / "notes.txt").write_text("mine")
+    with pytest.raises(OutputError, match="holds other files"):
+        dataset(spec_of(), folder.parent / "other", items=2, processes=1)

@@ -85,13 +85,13 @@ def see(project: Project, grade: Grade, progress: Progress | None = None) -> Pic
     stage = stage.replace(art=art, quality=quality, output=Output(layers="ghosts", starburst=False))
     rendering = render_any(stage, progress=progress)
     width, height = stage.camera.size_px
-    across = stage.camera.sensor[0] / width
-    ghosts = [_seen(layer, (width, height), across) for layer in rendering.layers if layer.name.startswith("ghost.")]
+    pixel_mm = (stage.camera.sensor[0] / width, stage.camera.sensor[1] / height)
+    ghosts = [_seen(layer, (width, height), pixel_mm) for layer in rendering.layers if layer.name.startswith("ghost.")]
     lit = sorted((ghost for ghost in ghosts if ghost.flux > 0.0), key=lambda ghost: -ghost.flux)
     return PickableGhosts(project, (width, height), tuple(lit))
 
 
-def _seen(layer: Layer, size: tuple[int, int], pixel_mm: float) -> SeenGhost:
+def _seen(layer: Layer, size: tuple[int, int], pixel_mm: tuple[float, float]) -> SeenGhost:
     light = _lit(layer.pixels)
     x, y, w, h = layer.window
     total = float(light.sum(dtype=np.float64))
@@ -100,9 +100,11 @@ def _seen(layer: Layer, size: tuple[int, int], pixel_mm: float) -> SeenGhost:
     columns, rows = np.arange(w) + x + 0.5, np.arange(h) + y + 0.5
     along, down = light.sum(axis=0, dtype=np.float64) / total, light.sum(axis=1, dtype=np.float64) / total
     cx, cy = float(along @ columns), float(down @ rows)
-    spread_px = float(along @ (columns - cx) ** 2 + down @ (rows - cy) ** 2) ** 0.5
+    # pixels of a desqueezed picture are no squares on the sensor
+    wide, high = pixel_mm
+    rms_mm = float(wide**2 * (along @ (columns - cx) ** 2) + high**2 * (down @ (rows - cy) ** 2)) ** 0.5
     return SeenGhost(
-        layer.name.removeprefix("ghost."), total * pixel_mm**2, float(light.max()), spread_px * pixel_mm,
+        layer.name.removeprefix("ghost."), total * wide * high, float(light.max()), rms_mm,
         (cx / size[0], cy / size[1]), layer.window, light,
     )  # fmt: skip
 

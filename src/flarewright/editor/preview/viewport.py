@@ -235,8 +235,10 @@ class Screen:
 
     def rest(self) -> None:
         """Resume the final picture after a drag without a change."""
-        if self._busy != _render_inputs(self.session.project, self.session.view):
-            self._on_event({"type": "changed"})
+        # a change meanwhile would be drawn before the project of before it
+        with self.session.lock:
+            if self._busy != _render_inputs(self.session.project, self.session.view):
+                self._on_event({"type": "changed"})
 
 
 def _render_inputs(project: Project, view: View) -> tuple[Project, View]:

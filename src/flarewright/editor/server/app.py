@@ -277,7 +277,11 @@ def _export(workspace: Workspace, request: Request, _body: Any) -> Any:
         from ..preview.display_image import png
 
         return Response(png(shown_pixels(workspace.screen)), media_type="image/png", headers=name)
-    if kind == "csv" and workspace.screen.seen is None:
+    from ..preview.render_picture import pictured
+
+    seen = workspace.screen.seen
+    # those of the picture before a change belong to another project
+    if kind == "csv" and (seen is None or pictured(seen.project) != pictured(project)):
         raise ProjectError("the ghosts are still being measured; try again in a moment")
     from ...io.project.project_text import project_text
 
@@ -288,8 +292,8 @@ def _export(workspace: Workspace, request: Request, _body: Any) -> Any:
     elif kind == "look":
         text = files.look_of_project(project, stem)
     else:
-        assert workspace.screen.seen is not None
-        text = ghost_csv(workspace.screen.seen)
+        assert seen is not None
+        text = ghost_csv(seen)
     return Response(text, media_type="text/plain; charset=utf-8", headers=name)
 
 

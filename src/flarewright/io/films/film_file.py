@@ -140,12 +140,13 @@ def _film(path: str, _: tuple[int, int]) -> Film:
         # AVI has no times of frames that are shown in another order than they are stored
         unordered = container.format.name == "avi" and stream.codec_context.has_b_frames
         by_decoding = interlaced or unordered or stream.codec_context.name in _BY_DECODING
-    times, keys, digest, packets = _packets(path)
+    times, keys, digest, packets, trimmed = _packets(path)
     if by_decoding or len(np.unique(times)) < packets:
         times, keys, frames = _decoded_times(path)
     else:
         times, frames = np.sort(times), packets
-    _check_count(path, frames, packets, stated)
+    # a trimmed film stores frames that it does not show, and counts them
+    _check_count(path, frames, packets, 0 if trimmed else stated)
     fps, uneven = _rate(times, base, rate, frames)
     _check_length(path, frames, fps, long_s)
     if interlaced:
@@ -159,18 +160,19 @@ def _film(path: str, _: tuple[int, int]) -> Film:
     )  # fmt: skip
 
 
-def _packets(path: str) -> tuple[NDArray[np.int64], NDArray[np.int64], bytes, int]:
-    """Return the times of shown packets and of key frames, a digest of all, and their number."""
+def _packets(path: str) -> tuple[NDArray[np.int64], NDArray[np.int64], bytes, int, bool]:
+    """Return the times of shown packets and of key frames, a digest of all, the shown ones' number, if others exist."""
     digest = sha256()
     times: list[int] = []
     keys: list[int] = []
-    number = 0
+    number, trimmed = 0, False
     with opened(path) as container:
         for packet in container.demux(video_of(container, path)):
             if packet.size == 0:
                 continue
             digest.update(packet)
             if packet.is_discard:
+                trimmed = True
                 continue
             number += 1
             if number > MOST_FRAMES:
@@ -179,7 +181,7 @@ def _packets(path: str) -> tuple[NDArray[np.int64], NDArray[np.int64], bytes, in
                 times.append(packet.pts)
                 if packet.is_keyframe:
                     keys.append(packet.pts)
-    return np.array(times, np.int64), np.array(sorted(keys), np.int64), digest.digest(), number
+    return np.array(times, np.int64), np.array(sorted(keys), np.int64), digest.digest(), number, trimmed
 
 
 def _decoded_times(path: str) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:

@@ -192,7 +192,7 @@ def join_films(
         with _errors_of_the_disk(av), av.open(str(temporary), "w", options=options) as container:
             container.flags |= av.container.Flags.bitexact.value
             container.metadata["comment"] = comment
-            joined = None
+            joined, last = None, None
             for moment, part in parts:
                 for packet in _packets(part):
                     if joined is None:
@@ -202,6 +202,8 @@ def join_films(
                             joined.metadata["timecode"] = time_code
                     ticks = int(moment / fps / packet.time_base)
                     packet.pts, packet.dts = packet.pts + ticks, packet.dts + ticks
+                    # where frames lie farther apart, a part begins to decode before the previous one has ended
+                    packet.dts = last = packet.dts if last is None else max(packet.dts, last + 1)
                     packet.stream = joined
                     container.mux(packet)
 

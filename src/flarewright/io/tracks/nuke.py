@@ -209,10 +209,10 @@ def _keys(curve: list[Any], where: str) -> tuple[Floats, Floats]:
     for token in curve[1:]:
         if isinstance(token, list):
             raise FileError(f"{where} has an expression; bake it to keys")
-        head = token[0]
+        head = token[:1]
         if head == "x" and len(token) > 1:
             stated = number(token[1:], where, "a frame")
-        elif (len(token) == 1 and token.isalpha()) or head in "stuv":
+        elif (len(token) == 1 and token.isalpha()) or (head and head in "stuv"):
             # interpolation between keys, and slopes at them
             continue
         else:

@@ -59,7 +59,10 @@ def read_table(text: str, file: str, origin: Origin = "top-left") -> TrackFile:
     tracks: dict[str, list[dict[str, float]]] = {}
     for number_of, line in body:
         where = f"{name} line {number_of}"
-        cells = next(csv.reader([line], delimiter=separator))
+        try:
+            cells = next(csv.reader([line], delimiter=separator))
+        except csv.Error:
+            raise FileError(f"{where} is no line of a table; write {','.join(columns)}") from None
         if len(cells) != len(columns):
             raise FileError(f"{where} has {len(cells)} cells and not {len(columns)}; write {','.join(columns)}")
         row = dict(zip(columns, cells, strict=True))

@@ -244,7 +244,7 @@ def _frames(pattern: FramePattern, frames: str | Sequence[int] | None) -> tuple[
             )
         return there
     wanted = parse_frames(frames) if isinstance(frames, str) else tuple(sorted(set(frames)))
-    missing = [frame for frame in wanted if frame not in set(there)]
+    missing = sorted(set(wanted) - set(there))
     if missing or not wanted:
         raise ProjectError(
             f"{pattern.text} lacks frame{'s'[: len(missing) > 1]} {frames_text(missing)[:80]}; there are "

@@ -24,6 +24,7 @@ from ...model.project.distribution import (
     Uniform,
 )
 from ...render.scene.resolve import open_lens, resolve_project
+from .masks import focal_lengths
 
 # draft colours need three wavelengths, final ones seven
 _WAVELENGTHS = {"draft": 3, "final": 7}
@@ -155,7 +156,7 @@ def draw_item(spec: DatasetSpec, index: int) -> Drawn:
     )
     settled = resolve_project(project)
     f_number, opened = _f_number(spec.lens, settled.lens.f_number, rng)
-    lights = _lights(spec, index, settled.order.efl, project.camera.sensor)
+    lights = _lights(spec, index, focal_lengths(settled.order.efl, settled.order.efl_x), project.camera.sensor)
     exposure = draw_number(spec.exposure.stops, stream(spec, index, EXPOSURE))
     return Drawn(project.replace(f_number=f_number, lights=lights), coating, exposure, opened)
 
@@ -233,7 +234,9 @@ def _f_number(draws: LensDraws, widest: float, rng: np.random.Generator) -> tupl
     return max(drawn, widest), drawn < widest
 
 
-def _lights(spec: DatasetSpec, index: int, efl: float, sensor_mm: tuple[float, float]) -> tuple[Light, ...]:
+def _lights(
+    spec: DatasetSpec, index: int, efl: tuple[float, float], sensor_mm: tuple[float, float]
+) -> tuple[Light, ...]:
     """Return the lights; without one, a dark light on the axis, since a project needs one."""
     rng, draws = stream(spec, index, LIGHTS), spec.lights
     found = []
@@ -244,7 +247,7 @@ def _lights(spec: DatasetSpec, index: int, efl: float, sensor_mm: tuple[float, f
             reach = 0.5 + draws.place.margin
             place_mm = rng.uniform(-reach, reach, 2) * sensor_mm
             # places near (efl tan X, efl tan Y)
-            x, y = np.degrees(np.arctan(place_mm / efl))
+            x, y = np.degrees(np.arctan(place_mm / np.array(efl)))
             field = (float(x), float(y))
         found.append(
             Light(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite, sqrt
 from typing import Any
 
 import numpy as np
@@ -32,14 +33,18 @@ class LightImage:
     place_px : tuple of float
         Column and row of its centre; the first pixel's centre is (0.5, 0.5).
     radius_px : float
+        Up and down.
     radiance : ndarray, shape (3,)
         Linear Rec.709, in the unit of the background.
+    stretch : float
+        Its radius across over that down: a squeezed picture shows a disc as an oval.
     """
 
     number: int
     place_px: tuple[float, float]
     radius_px: float
     radiance: Floats
+    stretch: float = 1.0
 
     def inside(self, size_px: tuple[int, int]) -> bool:
         """Return whether the centre is in the picture."""
@@ -48,25 +53,31 @@ class LightImage:
     def coverage(self, size_px: tuple[int, int]) -> tuple[tuple[slice, slice], Pixels]:
         """Return the window of the disc, and the part of each of its pixels that the disc covers (to about 1 %)."""
         spans, offsets = [], []
-        for at, side in zip(self.place_px, size_px, strict=True):
-            low, high = int(np.floor(at - self.radius_px - 1.0)), int(np.ceil(at + self.radius_px + 1.0))
+        for at, side, stretch in zip(self.place_px, size_px, (self.stretch, 1.0), strict=True):
+            reach = self.radius_px * stretch + 1.0
+            low, high = int(np.floor(at - reach)), int(np.ceil(at + reach))
             inside = max(0, low), max(0, low, min(side, high))
             spans.append(slice(*inside))
             # a small disc is drawn whole, so that its area is known, and then cropped
             first, last = (low, high) if self.radius_px < _SMALL_PX else inside
             offsets.append((np.arange(first, last) + 0.5 - at, slice(inside[0] - first, inside[1] - first)))
         (x, columns), (y, rows) = offsets
-        cover = np.clip(self.radius_px - np.hypot(x[None, :], y[:, None]) + 0.5, 0.0, 1.0)
+        cover = np.clip(self.radius_px - np.hypot(x[None, :] / self.stretch, y[:, None]) + 0.5, 0.0, 1.0)
         if self.radius_px < _SMALL_PX:
-            cover *= np.pi * self.radius_px**2 / cover.sum()
+            cover *= np.pi * self.radius_px**2 * self.stretch / cover.sum()
         return (spans[1], spans[0]), cover[rows, columns].astype(np.float32)
+
+
+def focal_lengths(efl: float, efl_x: float | None) -> tuple[float, float]:
+    """Return the focal lengths across and down the picture, mm; that across is None or infinite if it has no own."""
+    return efl if efl_x is None or not isfinite(efl_x) else efl_x, efl
 
 
 def light_image(
     light: Light,
     number: int,
     place_mm: Sequence[float],
-    efl: float,
+    efl: tuple[float, float],
     size_px: tuple[int, int],
     sensor_mm: Sequence[float],
 ) -> LightImage:
@@ -79,8 +90,8 @@ def light_image(
     number : int
     place_mm : sequence of float
         Right and up from the middle of the sensor, from the traced direct image.
-    efl : float
-        Focal length, mm.
+    efl : tuple of float
+        Focal lengths across and down the picture, mm.
     size_px, sensor_mm
         Of the picture.
 
@@ -89,13 +100,15 @@ def light_image(
     LightImage
         A point's is a disc with the area of a pixel, with the same irradiance.
     """
-    zoom = size_px[0] / sensor_mm[0]
-    place = (0.5 * size_px[0] + place_mm[0] * zoom, 0.5 * size_px[1] - place_mm[1] * size_px[1] / sensor_mm[1])
-    radius = max(_POINT_PX, efl * float(np.tan(np.radians(0.5 * light.diameter_deg))) * zoom)
-    steradians = np.pi * (radius / zoom / efl) ** 2
+    zoom = [side / mm for side, mm in zip(size_px, sensor_mm, strict=True)]
+    place = (0.5 * size_px[0] + place_mm[0] * zoom[0], 0.5 * size_px[1] - place_mm[1] * zoom[1])
+    across, down = (length * each for length, each in zip(efl, zoom, strict=True))
+    stretch = across / down
+    radius = max(_POINT_PX / sqrt(stretch), down * float(np.tan(np.radians(0.5 * light.diameter_deg))))
+    steradians = np.pi * (radius / down) ** 2
     # of luminance one; deep reds lie outside Rec.709
     rgb = np.maximum(xyz_to_rgb_matrix("rec709") @ spectrum_xyz(light.spectrum), 0.0)
-    return LightImage(number, place, radius, light.intensity / steradians * rgb)
+    return LightImage(number, place, radius, light.intensity / steradians * rgb, stretch)
 
 
 def light_mask(images: Sequence[LightImage], starburst: Pixels) -> NDArray[np.uint8]:
@@ -119,7 +132,8 @@ def light_mask(images: Sequence[LightImage], starburst: Pixels) -> NDArray[np.ui
     dark = np.flatnonzero(brightest_channel(starburst) < 1.0)
     y, x = np.arange(high, dtype="f4")[:, None] + 0.5, np.arange(wide, dtype="f4")[None, :] + 0.5
     for image in images:
-        far = np.hypot(x - np.float32(image.place_px[0]), y - np.float32(image.place_px[1]))
+        place, stretch = np.array(image.place_px, "f4"), np.float32(image.stretch)
+        far = np.hypot((x - place[0]) / stretch, y - place[1])
         radius = image.radius_px
         if image.inside((wide, high)):
             # at least the pixel in which a small disc lies

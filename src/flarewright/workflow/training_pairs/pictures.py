@@ -18,7 +18,7 @@ from ...render.render import render as render_project
 from ...typing import Pixels
 from .background import background_of, mean_luminance
 from .draw import Drawn, brightened, draw_item, splits_of
-from .masks import LightImage, ghost_mask, light_image, light_mask
+from .masks import LightImage, focal_lengths, ghost_mask, light_image, light_mask
 from .sensor import Sensor, draw_sensor, exposed, noise_of
 
 # exposure of = "mean": value of the background's mean luminance, white at 1 (a grey card)
@@ -117,11 +117,10 @@ def _whole(layer: Layer | None, size_px: tuple[int, int], scale: float) -> Pixel
 
 def _light_images(rendering: Rendering, project: Project) -> list[LightImage]:
     """Return the sharp images of the lights that shine."""
-    summary = rendering.summary
+    summary, camera = rendering.summary, project.camera
+    efl = focal_lengths(summary["efl_mm"], summary.get("efl_x_mm"))
     return [
-        light_image(
-            light, number, facts["direct_position_mm"], summary["efl_mm"], project.camera.size_px, project.camera.sensor
-        )
+        light_image(light, number, facts["direct_position_mm"], efl, camera.size_px, camera.sensor)
         for number, (light, facts) in enumerate(zip(project.lights, summary["lights"], strict=True), 1)
         if light.intensity > 0.0
     ]

@@ -230,7 +230,8 @@ def _claim(plan: DatasetPlan, items: int) -> None:
         raise OutputError(f"cannot write {folder}: it is a file; give the name of a folder")
     if not folder.parent.is_dir():
         raise OutputError(f"cannot write {folder}: the folder {folder.parent} does not exist; create it first")
-    if folder.exists() and any(folder.iterdir()):
+    # another machine may be writing the description now; its unfinished file is hidden
+    if folder.exists() and any(not path.name.startswith(".") for path in folder.iterdir()):
         held = _held(about)
         if held is None:
             raise OutputError(f"{folder} holds other files; give a new or empty folder for the data set")
