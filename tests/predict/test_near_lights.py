@@ -192,3 +192,32 @@ def test_a_prediction_without_output_resumes_from_the_state_folder_with_its_chec
     assert "resuming with 6 pictures" in reported.err
     assert reported.out == whole.out
     assert not kept.exists()
+
+
+def test_a_wide_light_is_drawn_up_to_the_side():
+    """Its disc used to reach beyond the half-space in front, and the whole prediction was refused."""
+    project = Project(
+        lens="triplet-pestrecov", lights=(Light(field_deg=(0.0, 0.0), diameter_deg=20.0),),
+        camera=Camera(size_px=(48, 32)), iris={},
+    )  # fmt: skip
+    flare, frame = square_flare(project, statistics_quality("draft"))
+    assert np.isfinite(FlareTable(flare, frame).at(flare.reach_deg, 30.0).values).all()
+    assert any("it is drawn smaller there, with the same illuminance" in remark for remark in flare.remarks)
+    small = project.replace(lights=(Light(field_deg=(0.0, 0.0), diameter_deg=2.0),))
+    assert not any("drawn smaller" in remark for remark in square_flare(small, statistics_quality("draft"))[0].remarks)
+
+
+def test_another_mask_of_the_same_name_makes_another_flare(tmp_path):
+    from PIL import Image
+
+    path, found = tmp_path / "mask.png", []
+    for corner in (20, 30):
+        opening = np.zeros((64, 64), np.uint8)
+        opening[corner:-corner, corner:-corner] = 255
+        Image.fromarray(opening).save(path)
+        project = Project(
+            lens="heliar-tronnier", iris={"mask": str(path)}, lights=(Light(field_deg=(0.0, 0.0)),),
+            camera=Camera(size_px=(48, 32)),
+        )  # fmt: skip
+        found.append(square_flare(project, statistics_quality("draft"))[0].fingerprint)
+    assert found[0] != found[1]

@@ -6,12 +6,14 @@ import csv
 import io
 from functools import cache
 
+import numpy as np
 import pytest
 
 from flarewright.cli.app import run
 from flarewright.errors import LensError
 from flarewright.io.lens.library import library_names
 from flarewright.model import Surface
+from flarewright.optics.lens.dispersion import refractive_index
 from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.zoom import at_position
 from flarewright.render.analysis import ghosts
@@ -146,3 +148,17 @@ def test_convert_chooses_the_format_by_the_suffix(tmp_path, monkeypatch, capsys)
     assert run(["lens", "convert", "anamorphic-heliar-2x", "a.lens"]) == 2
     assert "meridians" in capsys.readouterr().err
     assert not (tmp_path / "a.lens").exists()
+
+
+def test_glass_without_v_d_keeps_its_dispersion(tmp_path):
+    """It used to be written as an ideal material, which does not disperse."""
+    (tmp_path / "a.csv").write_text(
+        "radius,thickness,n_d,semi_diameter\n60,6,1.7,12\n-200,2,,12\nstop,1,,8\n-80,3,1.6,12\n,90,,12\n"
+    )
+    lens = open_lens(tmp_path / "a.csv").lens
+    assert lens.rows[0].medium.v_d is None
+    remarks = export_lens(lens, tmp_path / "b.json")
+    assert any(f"row 0 that of {lens.rows[0].medium.dispersion.glass}" in remark for remark in remarks)
+    again = open_lens(tmp_path / "b.json").lens
+    spread = [float(np.ptp(refractive_index(one.rows[0].medium, np.array([486.13, 656.27])))) for one in (lens, again)]
+    assert spread[1] == pytest.approx(spread[0], rel=0.01)

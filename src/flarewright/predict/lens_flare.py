@@ -7,8 +7,11 @@ from functools import partial
 from math import acos, cos, degrees, radians
 
 from ..errors import LensError
+from ..io.files.text_file import digest_of
+from ..io.project.named_files import picture_files
 from ..model import Camera, Dirt, Layer, Output, Project, Quality
 from ..optics.lens.field_angles import field_angles
+from ..optics.pupil.light_shape import WIDEST_DEG, shrunk_to_fit
 from ..render.render import render
 from ..render.scene.opening import make_opening
 from ..render.scene.resolve import ResolvedProject, resolve_project
@@ -80,10 +83,19 @@ def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
     def draw(constellation_deg: float, roll_deg: float) -> Sequence[Layer]:
         # the renderer measures the distance along the axis
         along = None if light.distance is None else light.distance * cos(radians(constellation_deg))
-        there = light.replace(field_deg=field_angles(constellation_deg, roll_deg), distance=along)
+        # of a light that reaches behind the camera, the part in front of it counts as all
+        there = shrunk_to_fit(light.replace(field_deg=field_angles(constellation_deg, roll_deg), distance=along))
         return render(prepared.replace(lights=(there,)), threads=threads).layers
 
     width, height = prepared.camera.sensor
+    # another mask or map of heights may come under the same name
+    pictures = [digest_of(name) or "" for name in picture_files(prepared)]
+    reach, remarks = largest_constellation(light.distance, settled.order.efl), settled.remarks
+    if (widest := light.replace(field_deg=(reach, 0.0))) != shrunk_to_fit(widest):
+        remarks += (
+            f"towards {reach:g} degrees from the axis the light reaches beyond {WIDEST_DEG:g}: it is drawn smaller "
+            "there, with the same illuminance",
+        )
     return Flare(
         name=settled.lens.name,
         draw=draw,
@@ -93,9 +105,9 @@ def lens_flare(project: Project, *, threads: int | None = None) -> Flare:
         efl=settled.order.efl,
         scene_scale=float(summary["scene_irradiance_per_radiance"]),
         turns_by_deg=_turns_by(settled),
-        reach_deg=largest_constellation(light.distance, settled.order.efl),
-        fingerprint=fingerprint_of(prepared.model_dump_json()),
-        remarks=settled.remarks,
+        reach_deg=reach,
+        fingerprint=fingerprint_of(prepared.model_dump_json(), *pictures),
+        remarks=remarks,
         recipe=partial(_made_again, project),
     )
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from ..errors import LensError
 from ..io.files.atomic_write import write_text_atomically
 from ..io.lens.formats.optiland import optiland_text
@@ -11,6 +13,7 @@ from ..io.lens.formats.table_writer import csv_text, dotlens_text
 from ..io.lens.lens_writer import write_lens
 from ..io.lens.zemax.writer import LensState, zmx_text
 from ..model import Iris, Lens, Surface
+from ..optics.lens.dispersion import C_LINE_NM, D_LINE_NM, F_LINE_NM, refractive_index
 from ..optics.lens.paraxial import first_order
 from ..optics.lens.zoom import at_position
 
@@ -41,13 +44,27 @@ def export_lens(lens: Lens, path: Path) -> tuple[str, ...]:
     if suffix == ".toml":
         write_lens(lens, path)
         return ()
-    remarks = list(_left_out(lens, suffix))
+    lens, chosen = _with_abbe_numbers(lens)
+    remarks = [*chosen, *_left_out(lens, suffix)]
     try:
         text, found = _text(lens, suffix)
     except LensError as error:
         raise LensError(f"{lens.name}: {error}") from None
     write_text_atomically(path, text, newline="\n")
     return (*remarks, *found)
+
+
+def _with_abbe_numbers(lens: Lens) -> tuple[Lens, tuple[str, ...]]:
+    """Give media without V_d that of the dispersion that they have here; without it, glass would not disperse."""
+    rows, chosen = list(lens.rows), []
+    for k, row in enumerate(rows):
+        if isinstance(row, Surface) and row.medium is not None and row.medium.v_d is None and row.medium.dispersion:
+            n_f, n_d, n_c = refractive_index(row.medium, np.array([F_LINE_NM, D_LINE_NM, C_LINE_NM]))
+            rows[k] = row.replace(medium=row.medium.replace(v_d=round(float((n_d - 1.0) / (n_f - n_c)), 3)))
+            chosen.append(f"row {k} that of {row.medium.dispersion.glass}")
+    if not chosen:
+        return lens, ()
+    return lens.replace(rows=tuple(rows)), (f"V_d is not known; written as used here: {', '.join(chosen)}",)
 
 
 def _text(lens: Lens, suffix: str) -> tuple[str, tuple[str, ...]]:

@@ -334,3 +334,24 @@ def test_the_chart_draws_each_channel_in_its_colour():
     for curve, channel in zip([curves[k] for k in order], np.argsort(reflectance[-1]), strict=True):
         red_green_blue = [int(curve.colour[k : k + 2], 16) for k in (1, 3, 5)]
         assert int(np.argmax(red_green_blue)) == channel
+
+
+@pytest.mark.parametrize(
+    ("kind", "bounds", "fixed"),
+    [
+        ("film", {"film_index": (1.38, 1.38)}, (0, 1.38)),
+        ("film", {"film_nm": (100.0, 100.0)}, (1, 100.0)),
+        ("quarter-wave", {"center_wavelength_nm": (550.0, 550.0)}, (0, 550.0)),
+    ],
+)
+def test_a_bound_may_be_a_single_value(kind, bounds, fixed):
+    """Divisions by its width used to end in a traceback."""
+    values = np.full((len(mirrors_of(STRUCTURE)), 1), 500.0)
+    if kind == "film":
+        values = np.tile([1.6, 120.0], (len(values), 1))
+    problem = replace(problem_for(values, kind), bounds=Bounds(**bounds))
+    found = solve_colors(problem, starts=1)
+    column, value = fixed
+    worn = found.values[:, 1] > 0.0 if kind == "film" else np.ones(len(values), dtype=bool)
+    assert np.isfinite(found.cost)
+    assert found.values[worn, column] == pytest.approx(np.full(worn.sum(), value))

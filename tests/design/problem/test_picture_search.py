@@ -19,7 +19,7 @@ from flarewright.design.solvers.pool_search import PoolState, solve
 from flarewright.kernels.design import picture_search as kernel
 from flarewright.kernels.design.ghosts import BOUND, PLACE, RADIUS, REACH_THESIS
 from flarewright.kernels.jit.decorators import for_python
-from flarewright.model import Design, GhostTarget, Light, Project
+from flarewright.model import Design, GhostTarget, Iris, Light, Project
 
 compare = for_python(kernel.compare)
 
@@ -209,3 +209,16 @@ def test_polishing_keeps_what_meets_its_targets():
     (found,) = polish(problem, [(structure, x)])
     assert found.cost < 1e-14
     assert found.x == pytest.approx(x, abs=1e-6)
+
+
+def test_the_target_picture_has_the_iris_of_the_project():
+    lights, design = (Light(field_deg=(4.0, 0.0)),), Design(judge="picture", signed=False)
+    shown = [
+        problem_of(Project(lens="heliar-tronnier", lights=lights, design=design, iris=Iris(blades=blades)))[0]
+        .objective.picture.shown.wanted
+        for blades in (6, 8)
+    ]  # fmt: skip
+    plain = problem_of(Project(lens="heliar-tronnier", lights=lights, design=design))[0].objective.picture.shown.wanted
+    # the Heliar's own iris has six blades
+    assert np.array_equal(shown[0], plain)
+    assert not np.array_equal(shown[1], plain)

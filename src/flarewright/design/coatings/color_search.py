@@ -234,6 +234,8 @@ def _finish(problem: ColorProblem, values: Floats, over: Over = never) -> Coatin
     if problem.kind == "film":
         free = np.flatnonzero(np.repeat(values[:, 1::2] > 0.0, 2, axis=1).T)
     low, high = (np.repeat(limit, len(values)) for limit in problem.limits())
+    # a bound may be a single value
+    free = free[low[free] < high[free]]
 
     def shaped(x: Floats) -> Floats:
         return x.reshape(-1, len(values)).T
@@ -244,7 +246,7 @@ def _finish(problem: ColorProblem, values: Floats, over: Over = never) -> Coatin
     x, damping = values.T.ravel(), 1e-3
     old = residuals(x)
     cost = float(old @ old)
-    for _ in range(FINISHING_STEPS):
+    for _ in range(FINISHING_STEPS if free.size else 0):
         if over():
             break
         J = _jacobian(problem, shaped(x))[:, free]
@@ -272,6 +274,9 @@ def _jacobian(problem: ColorProblem, values: Floats) -> Floats:
     base, columns = log_colors(problem, logs), []
     for part in range(values.shape[1]):
         step = 1e-4 * (high[part] - low[part])
+        if step == 0.0:
+            columns.append(np.zeros((len(values), residuals.size)))
+            continue
         moved = values.copy()
         moved[:, part] += np.where(values[:, part] + step <= high[part], step, -step)
         change = (log_reflectances(problem, moved) - logs) / (moved - values)[None, :, part, None]

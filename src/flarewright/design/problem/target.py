@@ -60,7 +60,7 @@ def problem_of(project: Project) -> tuple[Problem, ResolvedProject]:
     if len(objective.targets) == 0 or objective.wanted == 0:
         raise ProjectError("no ghost is a target; keep some of the lens' own ghosts, or add new targets")
     if design.judge == "picture":
-        objective = replace(objective, picture=_picture(project, objective, settled.lens.iris.blades))
+        objective = replace(objective, picture=_picture(project, objective, settled.iris.blades))
     found = _structures(design, structure, objective)
     changed = bool(design.ghost_targets) and design.own_ghosts
     bounds, glasses = design.bounds, None

@@ -14,6 +14,8 @@ from .lens_fields import ROW_NUMBERS
 _DIGITS = re.compile(r"(\d{3,7})\.(\d{3,7})|(\d{3})(\d{3})")
 _PAIR = re.compile(r"(\d+(?:\.\d+)?):(\d+(?:\.\d+)?)")
 _AIR = ("", "AIR", "VACUUM")
+# every optical glass has a larger index
+LEAST_GLASS = 1.3
 
 
 def named_medium(
@@ -39,7 +41,9 @@ def named_medium(
         return numbered_medium(None, float(pair[1]), float(pair[2]), place, problems, findings, number)
     if digits := _DIGITS.fullmatch(word):
         index, abbe = digits[1] or digits[3], digits[2] or digits[4]
+        # the code holds the decimals of n_d, which the densest glasses have above 2
         n_d, v_d = float(f"1.{index}"), float(f"{abbe[:2]}.{abbe[2:]}")
+        n_d += 1.0 if 1.0 < n_d < LEAST_GLASS else 0.0
         return numbered_medium(None, n_d, v_d, place, problems, findings, number)
     name, _, maker = word.rpartition("_")
     full = f"{maker} {name}" if name and maker.upper() in MAKERS else word

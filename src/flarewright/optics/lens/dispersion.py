@@ -10,6 +10,8 @@ from ...model import Dispersion, Medium
 from ...typing import Floats
 
 D_LINE_NM = 587.56
+# the lines of V_d = (n_d - 1) / (n_F - n_C)
+F_LINE_NM, C_LINE_NM = 486.13, 656.27
 
 # limits of extrapolation: a little beyond the maker's range, and visible light in any case
 _STRETCH = 0.15

@@ -20,7 +20,7 @@ FIELD = 1.65
 DARK_DEPTH = 25.0
 """Depth of dirt (`mean_depth`) that leaves no light: 1e-11 on average."""
 
-# fingerprint: ridge spacing, droplet diameter and spacing along ridges, half axes of the oval
+# fingerprint: ridge spacing, mean radius of droplets and their spacing along ridges, half axes of the oval
 _RIDGE_MM, _DROPLET_MM, _DROPLET_STEP_MM, _PRINT_MM = 0.5, 0.06, 0.15, (7.0, 9.0)
 # half the bend angle of a scratch
 _BEND_DEG = (0.5, 5.0)

@@ -17,6 +17,8 @@ from .polygon import centroid, closed, content, solid_angle
 ROUND = 32
 # largest field angle of a corner, degrees
 WIDEST_DEG = 89.0
+# a light that is made to fit stays so far within, relative
+ROUNDED = 1.0 - 1e-9
 
 
 @dataclass(frozen=True)
@@ -56,13 +58,7 @@ def light_outline(light: Light) -> Floats | None:
     if light.shape is None:
         corners = _disc(light)
     else:
-        if isinstance(light.shape, Rectangle):
-            half_x, half_y = (0.5 * size for size in light.shape.size_deg)
-            turn = radians(light.shape.rotation_deg)
-            square = np.array([[-half_x, -half_y], [half_x, -half_y], [half_x, half_y], [-half_x, half_y]])
-            offsets = square @ np.array([[cos(turn), sin(turn)], [-sin(turn), cos(turn)]])
-        else:
-            offsets = np.array(light.shape.corners_deg)
+        offsets = _offsets(light)
         angles = np.array(light.field_deg) + offsets
         # first, because areas of corners without a bound overflow
         if np.abs(angles).max() > WIDEST_DEG:
@@ -99,6 +95,35 @@ def disc_fits(light: Light) -> bool:
     """Return whether a round light lies within `WIDEST_DEG` of the axis."""
     slopes = (tan(radians(angle)) for angle in light.field_deg)
     return atan(hypot(*slopes)) + _disc_radius(light) <= radians(WIDEST_DEG)
+
+
+def shrunk_to_fit(light: Light) -> Light:
+    """Return a light no larger than fits within `WIDEST_DEG` of the axis, of the same shape and irradiance."""
+    if light.shape is not None:
+        across = np.abs(_offsets(light)).max()
+        room = WIDEST_DEG - float(np.abs(light.field_deg).max())
+        return light if across <= room else light.replace(shape=_scaled(light.shape, room / across * ROUNDED))
+    slopes = (tan(radians(angle)) for angle in light.field_deg)
+    room, radius = radians(WIDEST_DEG) - atan(hypot(*slopes)), _disc_radius(light)
+    return light if radius <= room else light.replace(diameter_deg=light.diameter_deg * room / radius * ROUNDED)
+
+
+def _scaled(shape: Rectangle | Polygon, factor: float) -> Rectangle | Polygon:
+    """Return a shape of another size."""
+    if isinstance(shape, Rectangle):
+        return shape.replace(size_deg=tuple(size * factor for size in shape.size_deg))
+    return shape.replace(corners_deg=tuple((x * factor, y * factor) for x, y in shape.corners_deg))
+
+
+def _offsets(light: Light) -> Floats:
+    """Return the corners of a light with a shape, field angles relative to its own, degrees."""
+    if not isinstance(light.shape, Rectangle):
+        assert light.shape is not None, "a disc has no corners"
+        return np.array(light.shape.corners_deg)
+    half_x, half_y = (0.5 * size for size in light.shape.size_deg)
+    turn = radians(light.shape.rotation_deg)
+    square = np.array([[-half_x, -half_y], [half_x, -half_y], [half_x, half_y], [-half_x, half_y]])
+    return np.asarray(square @ np.array([[cos(turn), sin(turn)], [-sin(turn), cos(turn)]]))
 
 
 def _disc_radius(light: Light) -> float:

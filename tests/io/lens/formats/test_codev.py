@@ -277,3 +277,11 @@ def test_one_zoom_position_is_no_position(tmp_path):
     found = opened(tmp_path, text)
     assert found.lens.positions == ()
     assert not any("ZOO" in said or "position" in said for said in found.remarks)
+
+
+@pytest.mark.parametrize("code", ["003283", "003.283", "003300.283000"])
+def test_a_code_of_glass_denser_than_two(tmp_path, code):
+    """A code holds the decimals of the index; 003 used to be read as 1.003."""
+    medium = opened(tmp_path, DOUBLET.replace("673.322", code)).lens.rows[2].medium
+    assert medium.n_d == pytest.approx(2.003, abs=4e-4)
+    assert medium.v_d == pytest.approx(28.3, abs=0.05)
