@@ -52,7 +52,7 @@ SHAPES = (
 )
 
 # options whose value lets a command run as long as it wants
-ENDLESS = {"--time", "--cpu", "--items"}
+ENDLESS = {"--time", "--cpu", "--items", "--seeds"}
 # what an option needs beside it to be read at all
 BESIDE: dict[str, tuple[str, ...]] = {
     "--error": ("--quality", "reference"), "--samples": ("--quality", "reference"),
