@@ -7,9 +7,11 @@ from flarewright.cli.app import run
 from flarewright.design.finishing.lens_edits import move_stop, resize_all, resize_ghost
 from flarewright.design.problem.ghosts import placed_ghosts
 from flarewright.errors import ProjectError
+from flarewright.io.lens.glass_catalogue import cauchy_from_abbe
 from flarewright.io.lens.toml_lens import read_lens
-from flarewright.model import Stop
+from flarewright.model import Lens, Medium, Position, Stop, Surface
 from flarewright.optics.lens.paraxial import first_order
+from flarewright.optics.lens.zoom import at_position
 from flarewright.render.scene.resolve import load_lens
 
 LENS = load_lens("heliar-tronnier")
@@ -100,3 +102,45 @@ def test_commands_write_lenses(tmp_path, monkeypatch, capsys):
 def test_a_size_that_no_radius_gives_is_refused():
     with pytest.raises(ProjectError, match="no curvature of row"):
         resize_ghost(LENS, (2, 1), 1e6)
+
+
+def zoom(gaps, **changes):
+    """Return a lens of two elements with the stop between them, and two positions that move some gaps."""
+    glass = Medium(glass=None, n_d=1.6, v_d=50.0, dispersion=cauchy_from_abbe(1.6, 50.0))
+    rows = (
+        Surface(curvature=1 / 40, thickness=4.0, medium=glass, semi_diameter=8.0),
+        Surface(curvature=-1 / 300, thickness=10.0, semi_diameter=8.0),
+        Stop(thickness=6.0),
+        Surface(curvature=1 / 60, thickness=3.0, medium=glass, semi_diameter=8.0),
+        Surface(curvature=-1 / 80, thickness=5.0, semi_diameter=8.0),
+        Surface(curvature=1 / 90, thickness=3.0, medium=glass, semi_diameter=8.0),
+        Surface(curvature=-1 / 200, thickness=0.0, semi_diameter=8.0),
+    )
+    positions = tuple(
+        Position(name=name, gaps=tuple((row, thickness * part) for row, thickness in gaps))
+        for name, part in (("wide", 1.0), ("tele", 0.5))
+    )
+    return Lens(name="a zoom", rows=rows, f_number=8.0, positions=positions, **changes)
+
+
+@pytest.mark.parametrize("gaps", [((1, 10.0),), ((2, 6.0),), ((1, 10.0), (2, 6.0), (4, 5.0)), ((4, 5.0),)])
+def test_a_zoom_keeps_its_gaps_when_its_stop_moves(gaps):
+    """Rows were numbered anew, but not the gaps that move: the stop's own gap was lost, or glass called moving."""
+    lens = zoom(gaps)
+    moved = move_stop(lens, 5)
+    for before, after in zip(lens.positions, moved.positions, strict=True):
+        one, other = at_position(lens, before), at_position(moved, after)
+        # the old stop is air and the new one, a plane in place of a weak surface, stands where that was
+        assert sum(row.thickness for row in one.rows[:5]) == pytest.approx(sum(row.thickness for row in other.rows[:4]))
+        thick = [row.thickness for row in one.rows]
+        assert [row.thickness for row in other.rows] == pytest.approx([*thick[:1], thick[1] + thick[2], *thick[3:]])
+
+
+def test_the_sensor_stays_where_it_is_when_a_rear_stop_moves():
+    rows = list(zoom(((1, 10.0),)).rows)
+    rows.append(rows.pop(2))
+    rows[-2] = rows[-2].replace(thickness=8.0)
+    lens = zoom(((1, 10.0),)).replace(rows=tuple(rows), positions=(), sensor_distance=60.0)
+    moved = move_stop(lens, 4)
+    ends = [sum(row.thickness for row in one.rows[:-1]) + one.sensor_distance for one in (lens, moved)]
+    assert ends[1] == pytest.approx(ends[0])

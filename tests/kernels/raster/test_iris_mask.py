@@ -166,3 +166,13 @@ def test_a_rotated_image_of_many_pixels_is_halved_and_keeps_its_light_and_place(
     assert 0.25 * (halved.mask[:-1, :-1] + halved.mask[1:, :-1] + halved.mask[:-1, 1:] + halved.mask[1:, 1:])[
         20:60, 20:60
     ] == pytest.approx(whole.mask[1:-1, 1:-1].reshape(84, 2, 84, 2).mean(axis=(1, 3))[20:60, 20:60], abs=1e-3)
+
+
+@pytest.mark.parametrize("texels", [2, 4, 8, 16])
+def test_stripes_are_as_bright_at_their_ends(texels):
+    """Beyond the last sample a mask goes on as that sample; cells there took the value of a corner."""
+    mask = np.repeat((np.arange(texels) >= texels // 2).astype(float)[:, None], texels, axis=1)
+    for stripes, axis in ((mask, 0), (mask.T, 1)):
+        sums = drawn(np.ascontiguousarray(stripes), n=16).sum(axis=axis)
+        lit = sums[sums > 0.0]
+        np.testing.assert_allclose(lit[1:-1], np.median(lit), rtol=1e-5)

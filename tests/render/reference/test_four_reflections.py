@@ -12,7 +12,9 @@ from pupil_sum import mono, picture, scene
 from flarewright.errors import ProjectError
 from flarewright.kernels.tracing.sequential import REFLECT
 from flarewright.model import Art, Camera, Rule
-from flarewright.optics.lens.paths import four_path
+from flarewright.optics.lens.paths import four_path, ghost_paths
+from flarewright.render.ghosts.final_ghosts import _level
+from flarewright.render.ghosts.traced_ghosts import find_final
 from flarewright.render.reference import four_reflections
 from flarewright.render.reference.four_reflections import find_four_reflections
 from flarewright.render.reference.search_sums import HITS, Tally
@@ -180,3 +182,35 @@ def test_four_reflections_are_named_only_where_there_are_some():
     two = project(Rule(select="4-1-3-2", gain=2.0), lens="heliar-tronnier")
     with pytest.raises(ProjectError, match="has no ghost 4-1-3-2"):
         render(two.replace(quality=two.quality.replace(orders=2)))
+
+
+def test_a_near_light_is_judged_by_the_irradiance_that_it_gives():
+    """Its ghosts were weighed without the growth of its irradiance towards the pupil, the limit with it."""
+    near = project(lens="canon-28-80", light=mono((5.0, 0.0)).replace(distance=60.0))
+    settled = resolve_project(near)
+    shots = make_shots(settled, make_opening(settled, None))
+    assert shots[0].incidence.falloff > 2.0
+    paths = ghost_paths(settled.lens)[:40]
+    found = [item for path in paths if (item := find_final(shots[0], path)) is not None]
+    assert _level([found], plain=True) == pytest.approx(_level([found]), rel=1e-12)
+
+
+def test_an_interrupted_sum_holds_whole_batches_only(monkeypatch):
+    random = np.random.default_rng(1)
+    fours = np.column_stack([random.integers(0, 40, 200), random.random(200)])
+    tally, whole = Tally(), Tally()
+    for each in (tally, whole):
+        each.add(fours, 1.0)
+
+    def interrupted(values, *_, **__):
+        for number, value in enumerate(zip(*values, strict=True)):
+            if number == 20:
+                raise KeyboardInterrupt
+            yield value
+
+    monkeypatch.setattr("flarewright.render.reference.search_sums.zip", lambda *v, **k: interrupted(v), raising=False)
+    with pytest.raises(KeyboardInterrupt):
+        tally.add(fours, 1.0)
+    monkeypatch.undo()
+    for one, other in zip(tally.arrays(), whole.arrays(), strict=True):
+        assert np.array_equal(one, other)

@@ -10,9 +10,10 @@ import numpy as np
 
 from ...errors import LensError, ProjectError
 from ...kernels.design import ghosts as columns
-from ...model import Lens, Stop, Surface
+from ...model import Lens, Position, Stop, Surface
 from ...optics.lens.paraxial import FirstOrder, first_order
 from ...render.scene.resolve import complete_lens
+from ...sentences import INVALID, validation_sentences
 from ...typing import Floats
 from ..problem.ghosts import evaluate
 from ..problem.opening import opened_to
@@ -262,8 +263,30 @@ def move_stop(lens: Lens, row: int) -> Lens:
     if 0 < old < len(rows):
         rows[old - 1] = rows[old - 1].replace(thickness=rows[old - 1].thickness + gone.thickness)
     presets = {name: tuple(c for k, c in enumerate(all_) if k != old) for name, all_ in lens.coating_presets.items()}
+    distance = lens.sensor_distance
+    if distance is not None and old == len(lens.rows) - 1:
+        # it was measured from the stop
+        distance += lens.rows[old - 1].thickness
+    if not any(isinstance(one, Surface) and one.medium is not None for one in rows):
+        raise LensError(f"with its stop at row {row}, {lens.name} has no glass: choose another row")
     try:
-        moved = lens.replace(rows=tuple(rows), coating_presets=presets, elements=(), f_number=1.0)
-    except ValueError as error:
-        raise LensError(f"with its stop at row {row}, {lens.name} has no glass: choose another row") from error
+        moved = lens.replace(
+            rows=tuple(rows), coating_presets=presets, elements=(), f_number=1.0, sensor_distance=distance,
+            positions=_without_row(lens, old),
+        )  # fmt: skip
+    except INVALID as error:
+        raise LensError(f"the stop of {lens.name} cannot move to row {row}: {validation_sentences(error)[0]}") from None
     return complete_lens(opened_to(moved, diameter))
+
+
+def _without_row(lens: Lens, old: int) -> tuple[Position, ...]:
+    """Return a lens' positions without one of its rows, whose gaps in front and behind become one."""
+    found = []
+    for position in lens.positions:
+        at = dict(position.gaps)
+        gaps = {k if k < old else k - 1: gap for k, gap in at.items() if k not in (old - 1, old)}
+        if 0 < old < len(lens.rows) - 1 and at.keys() & {old - 1, old}:
+            gaps[old - 1] = sum(at.get(k, lens.rows[k].thickness) for k in (old - 1, old))
+        if gaps:
+            found.append(position.replace(gaps=tuple(sorted(gaps.items()))))
+    return tuple(found)

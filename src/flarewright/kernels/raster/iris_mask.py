@@ -110,6 +110,9 @@ def even_value(mask, u_low, u_high, v_low, v_high):
         return 0.0
     c0, c1 = int(min(max(floor(left), 0.0), columns - 1.0)), int(min(max(floor(right) + 1.0, 0.0), columns - 1.0))
     r0, r1 = int(min(max(floor(top), 0.0), rows - 1.0)), int(min(max(floor(bottom) + 1.0, 0.0), rows - 1.0))
+    # the outer half of the border's samples lies in no interval between samples: take the nearest
+    c0, c1 = max(min(c0, columns - 2), 0), min(max(c1, 1), columns - 1)
+    r0, r1 = max(min(r0, rows - 2), 0), min(max(r1, 1), rows - 1)
     if changes[r1, c1] - changes[r0, c1] - changes[r1, c0] + changes[r0, c0] != 0:
         return -1.0
     return float(values[r0 * columns + c0])

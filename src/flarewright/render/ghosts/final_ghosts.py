@@ -176,7 +176,7 @@ def _level(found: Sequence[Sequence[FinalPass]], *, plain: bool = False) -> floa
     items = [item for group in found for item in group]
     if not items:
         return 0.0
-    seen = sum(item.region.seen_flux * (item.shot.light.intensity if plain else item.gain) for item in items)
+    seen = sum(item.region.seen_flux * (item.plain_gain if plain else item.gain) for item in items)
     return float(seen / (np.pi * items[0].shot.view_radius ** 2))
 
 

@@ -70,4 +70,9 @@ class FinalPass:
     @property
     def gain(self) -> float:
         """Factor from unit irradiance to the drawn brightness: the light's intensity and falloff, and the art gain."""
-        return self.shot.light.intensity * self.shot.incidence.falloff * self.art.visible_gain
+        return self.plain_gain * self.art.visible_gain
+
+    @property
+    def plain_gain(self) -> float:
+        """The same without the art gain."""
+        return self.shot.light.intensity * self.shot.incidence.falloff

@@ -85,14 +85,14 @@ def draft_details(shots: Sequence[Shot], paths: Sequence[LightPath], colors: Seq
     Notes
     -----
     As in final quality (docs/adr/0003), except that each path's irradiance is computed once, for the light with the
-    median field angle at the middle wavelength, and scaled by each light's intensity.
+    median field angle at the middle wavelength, and scaled by the irradiance of each light.
     """
     middle = sorted(range(len(shots)), key=lambda k: shots[k].incidence.tilt)[len(shots) // 2]
     shot = shots[middle]
     seen = weigh_drafts(shot, paths, colors[middle])
     width, height = shot.size_px
     # relative to the weighed light; if that is dark, every contrast stays infinite
-    power = np.array([each.light.intensity for each in shots]) / (shot.light.intensity or 1.0)
+    power = np.array([each.gain for each in shots]) / (shot.gain or 1.0)
     level = power.sum() * seen[:, 0].sum() / (width * height)
     contrast = np.full((len(shots), len(paths)), np.inf)
     # ghosts that are dark at the middle wavelength keep infinite contrast

@@ -30,30 +30,43 @@ class Tally:
     """
 
     def __init__(self, keys: NDArray[Any] | None = None, numbers: NDArray[Any] | None = None) -> None:
-        self.batches, self.two = 0, 0.0
-        self.flux: dict[int, float] = {}
-        self._sums = np.zeros(2)
+        # replaced at once, so that an interruption finds whole batches only
+        self._state: tuple[dict[int, float], int, float, Floats] = ({}, 0, 0.0, np.zeros(2))
         if keys is not None and numbers is not None:
             if keys.shape != (len(numbers) - _FACTS,) or not np.isfinite(numbers).all():
                 raise ValueError("sums of a search are damaged")
-            self.flux = dict(zip(keys.tolist(), numbers[:-_FACTS].tolist(), strict=True))
-            self.batches, self.two = int(numbers[-4]), float(numbers[-3])
-            self._sums = numbers[-2:].astype(np.float64)
+            flux = dict(zip(keys.tolist(), numbers[:-_FACTS].tolist(), strict=True))
+            self._state = (flux, int(numbers[-4]), float(numbers[-3]), numbers[-2:].astype(np.float64))
+
+    @property
+    def flux(self) -> dict[int, float]:
+        """Flux of each path, by its number, summed over the batches."""
+        return self._state[0]
+
+    @property
+    def batches(self) -> int:
+        """Number of batches."""
+        return self._state[1]
+
+    @property
+    def two(self) -> float:
+        """Two-reflection flux of all batches."""
+        return self._state[2]
 
     def add(self, fours: Floats, two: float) -> None:
         """Add a batch: its four-reflection rays, as of `batches.run_batch`, and its two-reflection flux."""
         keys, weights = fours[:, 0].astype(np.int64), fours[:, 1]
         names, place = np.unique(keys, return_inverse=True)
-        sums = np.bincount(place, weights=weights, minlength=len(names))
-        for key, value in zip(names.tolist(), sums.tolist(), strict=True):
-            self.flux[key] = self.flux.get(key, 0.0) + value
-        self.batches += 1
-        self.two += two
-        self._sums += weights.sum(), (weights**2).sum()
+        found = np.bincount(place, weights=weights, minlength=len(names))
+        flux = dict(self.flux)
+        for key, value in zip(names.tolist(), found.tolist(), strict=True):
+            flux[key] = flux.get(key, 0.0) + value
+        sums = self._state[3] + np.array([weights.sum(), (weights**2).sum()])
+        self._state = (flux, self.batches + 1, self.two + two, sums)
 
     def batches_for(self, limit: float) -> int:
         """Return the number of batches in which `HITS` rays meet a path at the limit."""
-        flux, squares = self._sums
+        flux, squares = self._state[3]
         if flux <= 0.0 or self.two <= 0.0:
             return self.batches
         # effective flux per ray for the variance of a sum of rays
@@ -64,7 +77,7 @@ class Tally:
 
     def arrays(self) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return the keys and numbers from which a tally starts with the same sums."""
-        facts = [float(self.batches), self.two, *self._sums.tolist()]
+        facts = [float(self.batches), self.two, *self._state[3].tolist()]
         return np.array(list(self.flux), dtype=np.int64), np.array([*self.flux.values(), *facts])
 
 
