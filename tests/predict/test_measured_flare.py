@@ -20,6 +20,7 @@ from flarewright.model.project.scene import Lamp, SceneCamera
 from flarewright.optics.colour.rgb import luminance_weights
 from flarewright.workflow.measured_camera import model_in_scene
 from flarewright.workflow.measured_flares import Counting, model_flare, model_flares
+from flarewright.workflow.searches.flare_targets import project_of_model
 
 # light of the captures: 1e5 cd/m2 over 1e-4 sr give 10 lx
 CAPTURED = Reference(f_number=2.0, iso=100.0, exposure_s=0.5, luminance_cd_m2=1e5, solid_angle_sr=1e-4)
@@ -451,3 +452,20 @@ def test_another_process_makes_the_same_flares_again(file):
         assert np.array_equal(again.picture(12.0, 40.0), flare.picture(12.0, 40.0))
         made.append(again.fingerprint)
     assert len(set(made)) == 3
+
+
+@pytest.mark.parametrize(("low", "high", "covered"), [(-25.0, -2.0, (2.0, 25.0)), (-25.0, 3.0, (0.0, 25.0))])
+def test_a_flare_that_was_measured_on_the_other_side(tmp_path, low, high, covered):
+    """Half a turn away it is the same; the angles of the other side used to be refused or ignored."""
+    always = (planted().ghosts[0].replace(visible_deg=(-26.0, 26.0)),)
+    model = planted().replace(constellation_deg=(low, high), ghosts=always)
+    flare = model_flare(model, "left.json", 36.0, 0.02, 80, Counting())
+    assert (flare.least_deg, flare.reach_deg) == covered
+    (drawn, *_) = flare.draw(12.0, 30.0)
+    whole = model.replace(constellation_deg=(-25.0, 25.0))
+    (other, *_) = model_flare(whole, "both.json", 36.0, 0.02, 80, Counting()).draw(-12.0, 210.0)
+    assert np.array_equal(drawn.pixels, other.pixels)
+    file = tmp_path / "left.json"
+    write_ghost_model(file, model)
+    project = project_of_model(file, [(12.0, 0.0)], None, 4)
+    assert project.design is not None

@@ -188,6 +188,7 @@ def model_flare(
     ProjectError
         When nothing counts.
     """
+    from ..measure.core.measured_side import measured_side
     from ..measure.replay.flare_only import counted_flare
     from ..predict.flare import Flare, Frame, fingerprint_of
     from ..predict.table import DECIMALS
@@ -206,10 +207,11 @@ def model_flare(
     size = (width_px, max(1, round(width_px * height / width)))
 
     def draw(constellation_deg: float, roll_deg: float) -> Sequence[Layer]:
+        there, roll = measured_side(drawn, constellation_deg, roll_deg)
         return counted_flare(
             drawn,
-            constellation_deg,
-            roll_deg=roll_deg,
+            there,
+            roll_deg=roll,
             size_px=size,
             around=around,
             gain=1.0 if light_lx is None else 1.0 / light_lx,
@@ -219,7 +221,9 @@ def model_flare(
     low, high = model.constellation_deg
     # constellations are rounded to these decimals: round the limits inwards
     grid = 10.0**DECIMALS
-    least = max(math.ceil(low * grid) / grid, 0.0)
+    nearest = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
+    farthest = max(abs(low), abs(high))
+    least = math.ceil(nearest * grid) / grid
     settings = str((size, unit_per_cd_m2, around))
     return Flare(
         name=name,
@@ -231,7 +235,7 @@ def model_flare(
         # turning the frame would need light beyond the captures' border, which was not measured
         turns_by_deg=None,
         least_deg=least,
-        reach_deg=max(math.floor(high * grid) / grid, least),
+        reach_deg=max(math.floor(farthest * grid) / grid, least),
         dark_beyond=False,
         unit=unit,
         per_lux=light_lx is not None,

@@ -219,3 +219,17 @@ def test_one_lost_photograph_is_left_out_where_two_others_remain(folder):
     with pytest.raises(FlarewrightError, match="does not exist: check the path") as reported:
         read_capture_list(folder / "captures.csv")
     assert len(reported.value.problems) == 2
+
+
+@pytest.mark.parametrize("lost", [None, (0, 0), (1, 0), (1, 1), (2, 2), (3, 0)])
+def test_a_lost_photograph_leaves_the_angles_of_the_others(tmp_path, lost):
+    """All exposures behind a lost first one used to move to the angle before theirs."""
+    names = [(angle, k) for angle in range(4) for k in range(3) if (angle, k) != lost]
+    times = (0.004, 0.02, 0.2)
+    for angle, k in names:
+        (tmp_path / f"a{angle}-{k}.npy").write_bytes(b"")
+    text = HEAD + "".join(f"a{angle}-{k}.npy,,{times[k]},100,8\n" for angle, k in names)
+    found = listed(tmp_path, text, AngleRule(1.0, 0.5))
+    assert [(one.file, one.constellation_deg) for one in found] == [
+        (f"a{angle}-{k}.npy", 1.0 + 0.5 * angle) for angle, k in names
+    ]

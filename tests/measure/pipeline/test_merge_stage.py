@@ -17,6 +17,7 @@ from flarewright.measure.merging.camera_geometry import SightingInput, solve_geo
 from flarewright.measure.merging.light_position import find_light
 from flarewright.measure.merging.settings import MergeSettings
 from flarewright.measure.pipeline.merge_stage import merge_captures, merge_frame
+from flarewright.measure.pipeline.provenance import run_digest
 from flarewright.measure.pipeline.search_images import reference_of
 from flarewright.model.measurement.capture import CameraNoise
 
@@ -186,7 +187,7 @@ def test_frames_of_lines_that_are_gone_go_too(tmp_path):
     merge_captures(captures[:-4], tmp_path, run, camera=KNOWN)
     left = [f"frame-{k:03d}.{kind}" for k in range(len(ANGLES) - 2) for kind in ("exr", "json")]
     assert sorted(path.name for path in (run / "frames").iterdir()) == [*left, "frame-mine.txt"]
-    assert len(list((run / "upright").iterdir())) == len(ANGLES) - 2
+    assert sorted(path.name for path in (run / "upright").iterdir()) == left
 
 
 @pytest.mark.parametrize("camera", [KNOWN, KNOWN.replace(electrons_per_unit=None, read_noise=None)])
@@ -588,3 +589,51 @@ def test_upright_frames_are_turned_about_the_axis(tmp_path):
     # the original frames are kept and reused
     again = merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN)
     assert again == plain
+
+
+def test_a_merge_that_fails_leaves_no_index_of_other_pixels(tmp_path):
+    """Later stages would pair the angles and lights of the earlier merge with the pixels of this one."""
+    scenes = {angle: star(light_px(angle)) for angle in ANGLES}
+    run = tmp_path / "run"
+    merge_captures(read_captures(shoot(tmp_path, scenes)), tmp_path, run, camera=KNOWN)
+    assert read_run(run).frames
+    turned = dict(zip(ANGLES, reversed(scenes.values()), strict=True))
+    with pytest.raises(FlarewrightError):
+        merge_captures(read_captures(shoot(tmp_path, turned)), tmp_path, run, camera=KNOWN)
+    with pytest.raises(FlarewrightError, match=r"merged\.json does not exist"):
+        read_run(run)
+
+
+def test_upright_frames_are_kept(tmp_path):
+    """They were written anew by every merge, so every later stage began from the start."""
+    captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
+    run, settings = tmp_path / "run", MergeSettings(upright=True)
+    first = merge_captures(captures, tmp_path, run, camera=KNOWN, settings=settings)
+    before = [run_digest(run, first, {}), *(path.stat().st_mtime_ns for path in sorted((run / "upright").iterdir()))]
+    again = merge_captures(captures, tmp_path, run, camera=KNOWN, settings=settings)
+    after = [run_digest(run, again, {}), *(path.stat().st_mtime_ns for path in sorted((run / "upright").iterdir()))]
+    assert after == before
+    # a damaged one is written again
+    (run / first.frames[1].file).write_bytes(b"")
+    merge_captures(captures, tmp_path, run, camera=KNOWN, settings=settings)
+    assert read_frame(run, first.frames[1]).radiance.any()
+
+
+def test_a_faint_light_whose_place_is_given_is_found(tmp_path):
+    """The columns that the message asks for did not help."""
+    x, y = np.arange(96) + 0.5, np.arange(64)[:, None] + 0.5
+    scenes = {}
+    for angle in ANGLES:
+        at = light_px(angle)
+        light = 0.5 + 3.0 * np.exp(-0.5 * (np.hypot(x - at[0], y - at[1]) / 1.2) ** 2)
+        scenes[angle] = (light[..., None] * np.ones(3)).astype(np.float32)
+    captures = read_captures(shoot(tmp_path, scenes))
+    with pytest.raises(FlarewrightError, match="give light_x_px and light_y_px"):
+        merge_captures(captures, tmp_path, tmp_path / "run", camera=KNOWN)
+    placed = [
+        one.replace(light_x_px=light_px(one.constellation_deg)[0], light_y_px=light_px(one.constellation_deg)[1])
+        for one in captures
+    ]
+    run = merge_captures(placed, tmp_path, tmp_path / "run", camera=KNOWN)
+    assert all(frame.light_found for frame in run.frames)
+    assert run.frames[-1].light_px == pytest.approx(light_px(ANGLES[-1]), abs=0.2)

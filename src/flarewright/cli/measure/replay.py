@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -44,8 +44,10 @@ def replay(
     """Render a measured flare as layers of an EXR file."""
     check_place(output, ".exr")
     from ...io.images.exr import write_exr
+    from ...io.images.file_space import FileSpace
     from ...io.images.half import half_scale
     from ...io.measurement.ghost_model_file import read_ghost_model, read_replay_camera
+    from ...measure.core.measured_side import measured_side
     from ...measure.replay.model_image import replay_model as draw
     from ...measure.replay.placement import brightness_gain
     from ...model.measurement.replay_camera import ReplayCamera
@@ -54,6 +56,9 @@ def replay(
     known = read_ghost_model(model)
     shot = ReplayCamera() if camera is None else read_replay_camera(camera)
     angle, turn = _place(shot, constellation, roll)
+    if shot.light is not None:
+        # a camera file does not choose the side
+        angle, turn = measured_side(known, angle, turn)
     pixels = picture_size(size) if size is not None else shot.size_px or known.size_px
     gain = brightness_gain(known.reference, shot)
     layers = draw(known, angle, roll_deg=turn, size_px=pixels, gain=gain, single=single,
@@ -61,9 +66,10 @@ def replay(
     metadata = {"model": model.name, "constellation_deg": f"{angle:.9g}", "roll_deg": f"{turn:.9g}"}
     # the gain stands for the light's strength, as the intensity does in `render`
     scale = 1.0 if full else half_scale(gain)
-    print_remarks(
-        write_exr(output, layers, pixels, pixel_type="float" if full else "half", scale=scale, metadata=metadata)
-    )
+    kind: Literal["half", "float"] = "float" if full else "half"
+    # other programs would take a camera's own colours for Rec.709
+    space: Literal["rec709"] | FileSpace = "rec709" if rec709 else FileSpace("camera", "")
+    print_remarks(write_exr(output, layers, pixels, pixel_type=kind, scale=scale, metadata=metadata, colorspace=space))
     facts = {
         "output": str(output), "constellation_deg": angle, "roll_deg": turn, "brightness": gain,
         "size_px": list(pixels), "layers": [layer.name for layer in layers], "scale": scale,

@@ -19,6 +19,7 @@ import re
 from collections import Counter
 from collections.abc import Container, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -255,10 +256,49 @@ def _missing_exposure_sentence(
     return [f"{len(where)} of {len(rows)} photographs have no exposure_s, the first is {first}; {remedy}"]
 
 
+_Setting = tuple[str, str]
+
+
+def _setting(row: dict[str, Any]) -> _Setting:
+    """Return exposure and ISO of a photograph, as the list writes them."""
+    return str(row.get("exposure_s")), str(row.get("iso"))
+
+
+def _bracket(settings: Sequence[_Setting]) -> list[_Setting]:
+    """Return the exposures of one angle in their order, from those of all angles in turn, of which some may be lost."""
+    if not settings:
+        return []
+    after = Counter(pair for pair in pairwise(settings) if pair[0] != pair[1])
+    cycle = [settings[0]]
+    rest = list(dict.fromkeys(settings))[1:]
+    while rest:
+        # the most common successor; the first one of several
+        best = max(rest, key=lambda one: after[cycle[-1], one])
+        cycle.append(best)
+        rest.remove(best)
+    # the first photograph may be lost: a rising or falling order begins where the cycle turns against it
+    times = [_seconds(setting) for setting in cycle]
+    steps = [b > a for a, b in pairwise([*times, times[0]])]
+    for direction in (True, False):
+        if len(cycle) > 2 and steps.count(not direction) == 1:
+            start = (steps.index(not direction) + 1) % len(cycle)
+            return [*cycle[start:], *cycle[:start]]
+    return cycle
+
+
+def _seconds(setting: _Setting) -> float:
+    try:
+        return float(setting[0])
+    except ValueError:
+        return 0.0
+
+
 def _with_angles(rows: Sequence[dict[str, Any] | None], rule: AngleRule, path: Path) -> list[dict[str, Any] | None]:
-    """Assign angles by the rule; the next one begins when an exposure repeats."""
+    """Assign angles by the rule; the next one begins where the order of the exposures does, also if one is lost."""
     found: list[dict[str, Any] | None] = []
-    seen, step = set[tuple[str, str]](), 0
+    lights = [row for row in rows if row is not None and row.get("kind", "light") == "light"]
+    order = {setting: place for place, setting in enumerate(_bracket([_setting(row) for row in lights]))}
+    last, step = -1, 0
     for row in rows:
         if row is None or row.get("kind", "light") != "light":
             found.append(row)
@@ -268,10 +308,9 @@ def _with_angles(rows: Sequence[dict[str, Any] | None], rule: AngleRule, path: P
                 f"{path} gives constellation_deg of {row['file']}, and so does the rule {rule.start:g}{rule.step:+g}: "
                 "leave out --angles, or empty that column"
             )
-        setting = (str(row.get("exposure_s")), str(row.get("iso")))
-        if setting in seen:
-            seen, step = set(), step + 1
-        seen.add(setting)
+        place = order[_setting(row)]
+        step += place <= last
+        last = place
         found.append({**row, "constellation_deg": round(rule.start + step * rule.step, 9)})
     return found
 

@@ -25,6 +25,21 @@ _LARGEST_INDEX = 64_000_000
 _RADIANCE, _VARIANCE = "radiance", "radiance.variance"
 
 
+def remove_index(folder: Path) -> None:
+    """Delete the index of a run before its frames change: it would describe other pixels until it is written anew.
+
+    Raises
+    ------
+    OutputError
+        When it cannot be deleted.
+    """
+    try:
+        (folder / INDEX).unlink(missing_ok=True)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise OutputError(f"cannot delete {folder / INDEX} ({reason}): check the permissions") from None
+
+
 def write_frame(folder: Path, frame: MergedFrame) -> None:
     """Write the pixels of a frame to the file in its `info`, as photographed: the light's drift is not removed.
 

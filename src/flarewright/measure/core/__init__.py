@@ -7,6 +7,7 @@ arrays, the journal of finished steps, and the helpers for threads and memory. T
 - `binning`: pictures averaged over blocks of pixels (`binned`)
 - `checkpoint`: journal that lets a stopped stage resume (`journal`, `Journal`, `recorded`)
 - `frame_reading`: reads the frames of a merged run (`read_views`)
+- `measured_side`: the side of the axis on which a light was photographed (`measured_side`)
 - `neighbourhood`: `brightest`, `darkest` values of square neighbourhoods
 - `parallel`: work shared among threads (`map_batched`, `done_by`, `dealt_out`, `run_concurrently`)
 - `parameter_vector`: ghosts of a model as the arrays that kernels take, and back (`channel_numbers`, `channel_of`,

@@ -122,8 +122,10 @@ def calibrate(
             refuse_contradiction(shots, settings=settings.exposures)
     known = camera
     if camera.electrons_per_unit is None or camera.read_noise is None:
+        # the noise of another ISO is another one
+        silent_ones = [photos[one.file] for one in captures if one.kind == "dark" and one.iso == iso]
         points = _points(pairs, black, white, first.samples, black_noise, settings.calibration) + _dark_points(
-            darks, first.samples, settings.calibration
+            silent_ones, first.samples, settings.calibration
         )
         known = fit_transfer(points, camera, first.step, settings.calibration)
         remarks.append(_noise_words(camera, known))

@@ -83,9 +83,13 @@ def believable(sightings: Sequence[LightSighting], settings: GeometrySettings = 
         When there is no light, or there are two.
     """
     best = max(one.flux for one in sightings)
-    found = [one.flux > settings.faintest * best and not one.at_border and one.clipped_share < 0.5 for one in sightings]
+    # what the user gives may be faint
+    found = [
+        one.given or (one.flux > settings.faintest * best and not one.at_border and one.clipped_share < 0.5)
+        for one in sightings
+    ]
     contrast = max((one.contrast for one, seen in zip(sightings, found, strict=True) if seen), default=0.0)
-    if contrast < settings.least_contrast:
+    if contrast < settings.least_contrast and not any(one.given for one in sightings):
         raise FlarewrightError(
             f"no light was found: nothing stands out of the pictures by more than {settings.least_contrast:g} "
             "times their median; check the photographs, or give light_x_px and light_y_px in captures.csv"

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from math import cos, radians, sin
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ...io.files.atomic_write import make_folder
-from ...io.measurement.merged import read_frame, write_frame
+from ...errors import FileError
+from ...io.files.atomic_write import make_folder, write_text_atomically
+from ...io.files.text_file import digest_of, read_json
+from ...io.measurement.merged import read_frame, remove_index, write_frame
 from ...model.measurement.capture import FrameInfo, MergedFrame, MergedRun
 from ...typing import Floats, Pixels, Progress
 
@@ -45,13 +49,46 @@ def make_upright(folder: Path, run: MergedRun, progress: Progress) -> MergedRun:
     make_folder(folder / UPRIGHT)
     infos = []
     for k, info in enumerate(run.frames):
-        frame = _turned_upright(read_frame(folder, info))
-        here: FrameInfo = frame.info.replace(file=f"{UPRIGHT}/{Path(info.file).name}")
-        write_frame(folder, MergedFrame(here, frame.radiance, frame.variance))
+        here = _upright_info(info).replace(file=f"{UPRIGHT}/{Path(info.file).name}")
+        _write_upright(folder, info, here)
         infos.append(here)
         progress((k + 1) / len(run.frames), f"upright {k + 1} of {len(run.frames)}")
     remark = "frames were turned upright (--upright): neighbouring pixels share some of their noise"
     return run.replace(frames=tuple(infos), remarks=(*run.remarks, remark))
+
+
+def _write_upright(folder: Path, info: FrameInfo, here: FrameInfo) -> None:
+    """Write a frame turned upright, unless it is there already: then later stages keep what they have made of it."""
+    note, written = (folder / here.file).with_suffix(".json"), folder / here.file
+    # what merging has noted of the frame: its digest, and the ratios of its exposures
+    about = _noted((folder / info.file).with_suffix(".json"))
+    made_of = [about.get("sha256"), info.model_dump(mode="json")]
+    known = _noted(note)
+    if about.get("sha256") and known.get("of") == made_of and known.get("sha256") == digest_of(written):
+        return
+    remove_index(folder)
+    frame = _turned_upright(read_frame(folder, info))
+    write_frame(folder, MergedFrame(here, frame.radiance, frame.variance))
+    facts = {"of": made_of, "sha256": digest_of(written), "ratios": about.get("ratios", [])}
+    write_text_atomically(note, json.dumps(facts) + "\n")
+
+
+def _noted(note: Path) -> dict[str, Any]:
+    """Return the note of a frame; empty if there is none."""
+    try:
+        data = read_json(note, "the note of a frame")
+    except FileError:
+        return {}
+    return data if isinstance(data, dict) else {}
+
+
+def _upright_info(info: FrameInfo) -> FrameInfo:
+    """Return what is known of a frame after it is turned upright."""
+    c, s = cos(radians(info.horizon_deg)), sin(radians(info.horizon_deg))
+    dx, dy = info.light_px[0] - info.axis_px[0], info.light_px[1] - info.axis_px[1]
+    place = info.axis_px[0] + c * dx - s * dy, info.axis_px[1] + s * dx + c * dy
+    turned: FrameInfo = info.replace(roll_deg=info.nominal_roll_deg, light_px=place)
+    return turned
 
 
 def _turned_upright(frame: MergedFrame) -> MergedFrame:
@@ -73,10 +110,7 @@ def _turned_upright(frame: MergedFrame) -> MergedFrame:
         noise += _times(weight**2, frame.variance[top + down, left + right])
     noise[~inside] = np.inf
     light[~inside] = 0.0
-    dx, dy = info.light_px[0] - info.axis_px[0], info.light_px[1] - info.axis_px[1]
-    place = info.axis_px[0] + c * dx - s * dy, info.axis_px[1] + s * dx + c * dy
-    here: FrameInfo = info.replace(roll_deg=info.nominal_roll_deg, light_px=place)
-    return MergedFrame(here, light.astype(np.float32), noise.astype(np.float32))
+    return MergedFrame(_upright_info(info), light.astype(np.float32), noise.astype(np.float32))
 
 
 def _times(weight: Floats, variance: Pixels) -> Floats:

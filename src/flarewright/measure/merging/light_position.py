@@ -42,6 +42,8 @@ class LightSighting:
         Part of the pixels that are clipped in every exposure.
     other_px : tuple of float or None
         Brightest spot far from the light. Only the whole run shows whether it is a light or a ghost (`second_light`).
+    given : bool
+        The user gives the position.
     """
 
     position_px: tuple[float, float]
@@ -52,6 +54,7 @@ class LightSighting:
     rival_px: tuple[float, float] | None
     clipped_share: float
     other_px: tuple[float, float] | None = None
+    given: bool = False
 
 
 def find_light(radiance: Pixels, variance: Pixels, settings: LightSettings = LightSettings()) -> LightSighting:

@@ -39,6 +39,10 @@ class Noise:
     floor: float
 
 
+# electrons; a file of a simulation may have none
+LEAST_READ_NOISE = 0.01
+
+
 def noise_of(camera: CameraNoise, iso: float, step: float) -> Noise:
     """Return the noise at an ISO.
 
@@ -59,7 +63,8 @@ def noise_of(camera: CameraNoise, iso: float, step: float) -> Noise:
     if camera.electrons_per_unit is None or camera.read_noise is None:
         raise FlarewrightError("the camera's noise is unknown; give electrons_per_unit and read_noise in camera.json")
     slope = iso / camera.iso / camera.electrons_per_unit
-    return Noise(slope, (camera.read_noise * slope) ** 2 + step**2 / 12.0)
+    # without any noise a dark pixel would have an infinite weight
+    return Noise(slope, (max(camera.read_noise, LEAST_READ_NOISE) * slope) ** 2 + step**2 / 12.0)
 
 
 def smooth(band: NDArray[np.floating], side: int = _SIDE) -> NDArray[np.floating]:

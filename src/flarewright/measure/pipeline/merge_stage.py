@@ -24,7 +24,7 @@ from ...errors import FileError, FlarewrightError, OutputError
 from ...io.files.atomic_write import write_text_atomically
 from ...io.files.text_file import digest_of, read_json
 from ...io.images.photo import open_photo
-from ...io.measurement.merged import read_frame, read_run, write_frame, write_run
+from ...io.measurement.merged import read_frame, read_run, remove_index, write_frame, write_run
 from ...model.measurement.capture import OF_LIGHT, CameraNoise, Capture, FrameInfo, Matrix3, MergedFrame, MergedRun
 from ...sentences import count
 from ...typing import Progress, Report
@@ -42,7 +42,7 @@ from ..merging.settings import GeometrySettings, LightSettings, MergeSettings
 
 FRAMES = "frames"
 # increase when the same photographs give other pixels or another light position
-_VERSION = 3
+_VERSION = 4
 
 # memory per pixel during a merge (50 megapixels of RAW took 1.5 GB), and the limit for all concurrent merges, bytes
 _PIXEL_BYTES, _WORKING_BYTES = 124, 4e9
@@ -322,6 +322,8 @@ def merge_frame(plan: MergePlan, number: int, writing: AbstractContextManager[ob
     info = FrameInfo(file=file, constellation_deg=group[0].constellation_deg or 0.0, nominal_deg=0.0,
                      light_px=sighting.position_px, axis_px=(0.0, 0.0))  # fmt: skip
     with writing:
+        # the index of an earlier merge describes other pixels
+        remove_index(output)
         write_frame(output, MergedFrame(info, mean, variance))
         facts = {
             "digest": digest, "sha256": digest_of(output / file), "sighting": asdict(sighting),
@@ -347,7 +349,7 @@ def _with_given_light(
             )
         return replace(
             sighting, position_px=(x, y), error_px=settings.given_light_error_px, at_border=False, rival_px=None,
-            other_px=None,
+            other_px=None, given=True,
         )  # fmt: skip
     return sighting
 

@@ -33,6 +33,7 @@ from ...render.scene.art_rules import with_gain
 from ...render.scene.holdout import read_plates
 from ...render.scene.memory_check import check_memory, spare_bytes
 from ...typing import Floats, Progress
+from ..core.measured_side import measured_side
 from ..core.parameter_vector import fit_in
 from .art import Rgb, ghost_gains
 from .model_image import draw, light_px, replay_model, within_reach
@@ -255,9 +256,7 @@ def _seen(project: Project, flare: MeasuredFlare, light: Light, limit: bool = Fa
     slopes = np.tan(np.radians(light.field_deg))
     angle, roll = (float(each) for each in constellation_and_roll(np.eye(3), np.array([*slopes, 1.0])))
     low, high = model.constellation_deg
-    if not low <= angle <= high and low <= -angle <= high:
-        # only the other side was measured: half a turn away the flare is the same
-        angle, roll = -angle, roll + 180.0
+    angle, roll = measured_side(model, angle, roll)
     beyond = None
     if limit and not low <= angle <= high:
         here, there = (float(np.clip(each, low, high)) for each in (angle, -angle))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import atan, atan2, degrees, hypot, radians, tan
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from ...design.problem.photo_targets import PhotoGhost, seen_project
 from ...errors import FlarewrightError, ProjectError
 from ...io.images.picture import read_picture
 from ...io.measurement.ghost_model_file import read_ghost_model
+from ...measure.core.measured_side import measured_side
 from ...measure.core.parameter_vector import visible
 from ...measure.detection.single_image import Spot, spots_of_model, spots_of_picture
 from ...model import Project
@@ -53,7 +55,12 @@ def project_of_model(
     lights = []
     for x, y in lights_deg:
         constellation = degrees(atan(hypot(tan(radians(x)), tan(radians(y)))))
-        lights.append(((x, y), _striking(spots_of_model(model, constellation), pixel, most)))
+        side, _ = measured_side(model, constellation)
+        spots = spots_of_model(model, side)
+        if side < 0.0:
+            # this light lies towards the negative
+            spots = tuple(replace(spot, place_px=-spot.place_px) for spot in spots)
+        lights.append(((x, y), _striking(spots, pixel, most)))
     sensor = (width, width * model.size_px[1] / model.size_px[0])
     return seen_project(lights, size_px=model.size_px, sensor_mm=sensor, focal_mm=model.focal_px * pixel)
 
