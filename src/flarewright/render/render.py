@@ -259,14 +259,19 @@ def _through_iris(
 def _checked(project: Project) -> GhostRanking | None:
     """Check that the picture fits the memory; return an empty ranking if the project asks for a matte."""
     output, size_px = project.output, project.camera.size_px
+    refuse_matte_of_reference(project)
     ranks = output.matte_ranks if output.matte == "ghosts" else 0
-    if ranks and project.quality.mode == "reference":
-        raise ProjectError(
-            "a matte needs each ghost alone, which reference quality does not draw: choose final quality, or no matte"
-        )
     # a lower bound: beauty, ghosts and starburst exist in every render
     check_memory(prod(size_px) * (PIXEL_BYTES * (3 if output.starburst else 2) + RANK_BYTES * ranks), spare_bytes())
     return GhostRanking(size_px, ranks) if ranks else None
+
+
+def refuse_matte_of_reference(project: Project) -> None:
+    """Raise ProjectError for a matte of a quality that does not draw each ghost alone."""
+    if project.output.matte == "ghosts" and project.quality.mode == "reference":
+        raise ProjectError(
+            "a matte needs each ghost alone, which reference quality does not draw: choose final quality, or no matte"
+        )
 
 
 def _matte(ranking: GhostRanking, passes: Sequence[Layer], project: Project, art: ResolvedArt) -> GhostMatte:

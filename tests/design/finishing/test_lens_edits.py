@@ -63,6 +63,12 @@ def test_the_stop_moves_and_keeps_its_size():
         (["resize", "heliar-tronnier", "-o", "a.toml", "--ghost", "4-1", "--height", "2", "--mirror", "x"], "first or"),
         (["resize", "heliar-tronnier", "-o", "a.exr", "--ghost", "4-1", "--height", "2"], "must be named"),
         (["resize", "heliar-tronnier", "-o", "a.toml", "--height", "2"], "--ghost J-I for one"),
+        (["resize", "heliar-tronnier", "-o", "own.toml", "--all", "stop", "--height", "0.5"], "own.toml exists"),
+        (["move-stop", "heliar-tronnier", "-o", "own.toml", "--row", "3"], "own.toml exists"),
+        (
+            ["resize", "heliar-tronnier", "-o", "a.toml", "--all", "stop", "--height", "0.5", "--mirror", "second"],
+            "--mirror is for one ghost",
+        ),
         (["resize", "heliar-tronnier", "-o", "a.toml", "--all", "x", "--height", "2"], "stop or entrance"),
         (["resize", "heliar-tronnier", "-o", "a.toml", "--all", "entrance", "--height", "9"], "wider than that"),
         (["resize", "heliar-tronnier", "-o", "a.toml", "--all", "stop", "--height", "0.001"], "f-numbers go from"),
@@ -84,9 +90,10 @@ def test_the_stop_moves_and_keeps_its_size():
 )
 def test_errors_are_reported(words, reported, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.toml").write_text("mine")
     assert run(["design", *words]) == 2
     assert reported in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
 
 
 def test_commands_write_lenses(tmp_path, monkeypatch, capsys):

@@ -112,3 +112,20 @@ def test_a_layer_of_a_file_without_layers_is_refused(tmp_path):
     Image.fromarray(np.zeros((2, 2, 3), np.uint8)).save(tmp_path / "p.png")
     with pytest.raises(FileError, match="has no layers"):
         read_plate(tmp_path / "p.png", layer="diffuse")
+
+
+@pytest.mark.parametrize(
+    ("photometric", "shape", "words"),
+    [
+        ("separated", (12, 16, 4), "holds the inks of a print (CMYK), no light; save it as an RGB TIFF"),
+        ("miniswhite", (12, 16), "holds grey with white at 0, no light"),
+        ("palette", (12, 16), "holds a palette, no light"),
+    ],
+)
+def test_a_tiff_of_inks_is_no_light(tmp_path, photometric, shape, words):
+    """Their numbers were read as light: a negative, and a grey picture of indices."""
+    more = {"colormap": np.zeros((3, 256), np.uint16)} if photometric == "palette" else {}
+    tifffile.imwrite(tmp_path / "p.tif", np.full(shape, 200, np.uint8), photometric=photometric, **more)
+    with pytest.raises(FileError) as error:
+        read_plate(tmp_path / "p.tif")
+    assert words in str(error.value)

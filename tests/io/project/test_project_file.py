@@ -10,6 +10,7 @@ import pytest
 
 from flarewright.errors import ProjectError
 from flarewright.io.lens.coating_text import parse_coating_choice
+from flarewright.io.lens.lens_writer import write_lens
 from flarewright.io.project.project_file import project_json_schema, read_project
 from flarewright.io.project.project_text import project_text
 from flarewright.io.project.spectrum_text import parse_spectrum, spectrum_text
@@ -48,6 +49,7 @@ from flarewright.model import (
     Surface,
     Tabulated,
 )
+from flarewright.render.scene.resolve import load_lens
 
 LENS = Lens(
     name='A "lens"\twith\nodd characters \x7f ä',
@@ -333,3 +335,34 @@ def test_files_that_are_no_project(tmp_path, content, words):
     (tmp_path / "p.toml").write_bytes(content)
     with pytest.raises(ProjectError, match=words):
         read_project(tmp_path / "p.toml")
+
+
+def test_a_folder_behind_a_link_is_left_by_its_real_way(tmp_path, monkeypatch):
+    """Paths were counted along the link, and the written project named a file that does not exist."""
+    (tmp_path / "disk" / "renders").mkdir(parents=True)
+    (tmp_path / "shots").mkdir()
+    try:
+        (tmp_path / "shots" / "out").symlink_to(tmp_path / "disk" / "renders")
+    except OSError:
+        pytest.skip("this system makes no links")
+    monkeypatch.chdir(tmp_path / "shots")
+    write_lens(load_lens("heliar-tronnier"), "my.toml")
+    made = Project(lens="my.toml", lights=(Light(field_deg=(1.0, 2.0)),))
+    Path("out/p.toml").write_text(project_text(made, folder=Path("out")), "utf-8")
+    found = read_project("out/p.toml")
+    assert Path(found.lens).resolve() == tmp_path / "shots" / "my.toml"
+
+
+def test_the_configuration_of_colours_starts_at_the_projects_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sub").mkdir()
+    made = Project(
+        lens="heliar-tronnier", lights=(Light(field_deg=(1.0, 2.0)),),
+        output=Output(ocio_space="ACEScg", ocio_config="sub/show.ocio"),
+    )  # fmt: skip
+    Path("sub/p.toml").write_text(project_text(made, folder=Path("sub")), "utf-8")
+    assert 'ocio_config = "show.ocio"' in Path("sub/p.toml").read_text("utf-8")
+    assert Path(read_project("sub/p.toml").output.ocio_config) == Path("sub/show.ocio")
+    built_in = made.replace(output=made.output.replace(ocio_config="ocio://default"))
+    Path("sub/q.toml").write_text(project_text(built_in, folder=Path("sub")), "utf-8")
+    assert read_project("sub/q.toml").output.ocio_config == "ocio://default"

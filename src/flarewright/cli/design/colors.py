@@ -82,6 +82,8 @@ def colors(options: ColorOptions) -> None:
     measure = check_color_fitness(options.fitness)
     check_time(60.0 if options.time_s is None else options.time_s)
     check_place(options.output, ".toml")
+    if options.output.resolve() == options.project.resolve():
+        raise ProjectError(f"{options.output} is the project itself; give -o another name")
     from ...design.coatings.colors import color_problem
     from ...design.solvers.solvers import chosen
     from ...io.project.project_file import read_project

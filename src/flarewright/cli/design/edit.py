@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 import typer
 
 from ...errors import ProjectError
-from ..common import check_place, chosen_fstop, console, one_of, print_remarks
-from ..shared_options import FNumber, KnownLens, output_option
+from ..common import check_free, check_place, chosen_fstop, console, one_of, print_remarks
+from ..shared_options import FNumber, Force, KnownLens, output_option
 
 Output = Annotated[Path, output_option(metavar="LENS.toml", help="The changed lens.")]
 
@@ -25,13 +25,17 @@ def resize(
     ] = None,
     mirror: Annotated[str, typer.Option(help="Mirror whose curvature changes: first (J) or second (I).")] = "first",
     fstop: FNumber = None,
+    force: Force = False,
 ) -> None:
     """Resize one ghost by the radius of a mirror, or all by an opening, and list the effect on all ghosts."""
     check_place(output, ".toml")
+    check_free(output, force)
     which: Literal["first", "second"] = one_of("--mirror", mirror, ("first", "second"))
     opening: Literal["stop", "entrance"] = "stop" if every is None else one_of("--all", every, ("stop", "entrance"))
     if (ghost is None) == (every is None):
         raise ProjectError("no ghost given; give --ghost J-I for one, or --all stop or --all entrance for all")
+    if every is not None and which != "first":
+        raise ProjectError("--mirror is for one ghost: --all changes an opening; keep one")
     if not 0.0 < height < 1000.0:
         raise ProjectError(f"--height {height:g} is no size; give a number above 0 and below 1000")
     pair = None if ghost is None else _mirrors(ghost)
@@ -69,9 +73,11 @@ def move_stop(
     lens: KnownLens,
     output: Output,
     row: Annotated[int, typer.Option(help="Row that becomes the stop, a plane in air.")],
+    force: Force = False,
 ) -> None:
     """Make another row the stop; the old stop is removed."""
     check_place(output, ".toml")
+    check_free(output, force)
     from ...design.finishing.lens_edits import move_stop as moved
     from ...design.problem.prescription import structure_of
     from ...io.lens.lens_writer import write_lens

@@ -20,11 +20,16 @@ def check(file: Annotated[Path, typer.Argument(metavar="FILE", help="A project f
     """Check a project and its lens, and list all errors; exit code 2 if it cannot be rendered."""
     from ...io.project.project_file import read_project
     from ...measure.replay.measured_project import is_measured
+    from ...render.image.ocio_space import check_file_space
+    from ...render.render import refuse_matte_of_reference
     from ...workflow.project_files import open_project_files
 
     with errors_as_json(file, as_json), naming(file):
         project = read_project(file)
+        remarks = check_file_space(project)
+        refuse_matte_of_reference(project)
         found = _measured(project) if is_measured(project) else _of_lens(open_project_files(file, project))
+    found["remarks"] += remarks
     if as_json:
         print_json({"file": str(file), "usable": True, **found})
         return

@@ -58,7 +58,8 @@ class GhostsOptions:
         typer.Option(metavar="CORNER", help="Corner of --light-px: top-left (default) or bottom-left, as in Nuke."),
     ] = None
     size: Annotated[
-        str | None, typer.Option(metavar="WxH", help="With --light-px: picture in pixels (default: 1280x720).")
+        str | None,
+        typer.Option(metavar="WxH", help="With --light-px: picture in pixels (default: 1280x720, or the camera's)."),
     ] = None
     sensor: Annotated[
         str | None,
@@ -235,7 +236,8 @@ def _picture(options: GhostsOptions) -> dict[str, Any]:
 
     if not is_camera_name(options.sensor):
         return {**size, "sensor_mm": pair(options.sensor, "--sensor", "36x24 (mm)", "x")}
-    size_px, sensor_mm, _ = on_sensor(camera_format(options.sensor), size.get("size_px"))
+    size_px, sensor_mm, words = on_sensor(camera_format(options.sensor), size.get("size_px"))
+    print_remarks([words])
     return {"size_px": size_px, "sensor_mm": sensor_mm}
 
 

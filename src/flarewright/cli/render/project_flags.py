@@ -131,6 +131,9 @@ def space_flags(flags: RenderOptions, base: Project | None) -> dict[str, Any]:
     if flags.ocio is not None and not flags.ocio.is_file():
         raise ProjectError(f"--ocio {flags.ocio} {no_file(flags.ocio)}; give an OpenColorIO configuration")
     config = config_name(None if flags.ocio is None else str(flags.ocio.absolute()))
+    if Path(config).is_file():
+        # the variable OCIO may name one of this folder
+        config = str(Path(config).absolute())
     return {"colorspace": "rec709", "ocio_space": space, "ocio_config": config}
 
 
@@ -408,13 +411,19 @@ def scatter_flags(
     given = {key: value for key, value in changes.items() if value is not None}
     if not given:
         return None
-    used = _SCATTER_USES.get(model or "", ("--surface-roughness", "--cleanliness"))
-    for flag, value in (("--surface-roughness", roughness), ("--cleanliness", cleanliness)):
-        if value is not None and flag not in used:
-            raise ProjectError(f"{flag} has no effect on --scatter {model}; keep one")
     known = dict(base) if base is not None else {}
     if known.get("model") == "none":
         del known["model"]
+    of_project = known.get("model", "")
+    used = _SCATTER_USES.get(model or of_project, ("--surface-roughness", "--cleanliness"))
+    for flag, value in (("--surface-roughness", roughness), ("--cleanliness", cleanliness)):
+        if value is not None and flag not in used:
+            if model is None:
+                raise ProjectError(
+                    f"{flag} has no effect on the scatter of the project, {of_project}; add --scatter harvey-shack, "
+                    "or leave it out"
+                )
+            raise ProjectError(f"{flag} has no effect on --scatter {model}; keep one")
     return {"model": "harvey-shack", **known, **given}
 
 

@@ -16,6 +16,7 @@
 - `plate_image`: `read_matte` and `read_depth`, holdouts
 - `png`: `write_png`, `encode_png`, `png_address`
 - `sample_png`: `encode_samples`, PNG files of 8 or 16 bits for training data
+- `tiff_numbers`: `refuse_inks`, TIFF files whose numbers are not light
 - `transfer`: `decoded`, linear values of the codes of pictures and films
 - `thumbnails`: `thumbnail`, precomputed pictures of the library
 """

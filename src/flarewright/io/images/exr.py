@@ -485,7 +485,9 @@ def _stated(colorspace: Colorspace | FileSpace) -> dict[str, Any]:
     """Return the attributes of a colour space."""
     if not isinstance(colorspace, FileSpace):
         return {"chromaticities": CHROMATICITIES[colorspace], "colorInteropID": _INTEROP_ID[colorspace]}
-    named = {f"{_PREFIX}colorspace": printable(colorspace.name), f"{_PREFIX}ocio": printable(colorspace.config)}
+    named = {f"{_PREFIX}colorspace": printable(colorspace.name)}
+    if colorspace.config:
+        named[f"{_PREFIX}ocio"] = printable(colorspace.config)
     if colorspace.known is None:
         return named
     return {**named, "chromaticities": PRIMARIES[colorspace.known], "colorInteropID": colorspace.known}

@@ -14,7 +14,7 @@ class FileSpace:
     name : str
         As the configuration writes it.
     config : str
-        Name of the configuration.
+        Name of the configuration; empty for colours of no configuration, such as those of a camera.
     known : str or None
         Key of `colorimetry.PRIMARIES`, if its primaries are there.
     """

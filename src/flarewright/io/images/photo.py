@@ -23,6 +23,7 @@ from ...model.measurement.capture import Matrix3
 from ...typing import Pixels
 from ..files.door import no_file, outside, refuse_claim
 from ..files.silence_libraries import silenced
+from .tiff_numbers import refuse_inks
 
 _RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".rw2", ".orf", ".pef", ".srw", ".raw", ".crw", ".nrw", ".3fr")
 _TIFF = (".tif", ".tiff")
@@ -235,6 +236,7 @@ def _tiff_picture(path: Path) -> _Picture:
 
     with outside(path, what, remedy=remedy) as stream, tifffile.TiffFile(stream) as file:
         page = file.pages[0]
+        refuse_inks(path, page)
         mapped = bool(page.is_memmappable)
         shape, dtype = tuple(page.shape), np.dtype(page.dtype)
         if not mapped:

@@ -20,6 +20,7 @@ from .exr import CHROMATICITIES
 from .foreign_exr import read_exr_layer
 from .half import HALF_MAX
 from .picture import SCREEN
+from .tiff_numbers import refuse_inks
 from .transfer import decoded, white_of
 
 _TIFF = (".tif", ".tiff")
@@ -205,6 +206,7 @@ def _tiff(path: Path, transfer: Transfer | None) -> PlatePicture:
         # the values, and linear pixels
         refuse_claim(path, " x ".join(map(str, shape)), prod(shape) * (size + 8))
         values = np.asarray(page.asarray())
+        refuse_inks(path, page)
         if values.ndim == 3 and values.shape[0] in (3, 4) and values.shape[2] not in (3, 4):
             values = np.moveaxis(values, 0, 2)
         if values.ndim == 2:

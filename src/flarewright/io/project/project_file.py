@@ -113,6 +113,9 @@ def _expanded(data: dict[str, Any], folder: Path, problems: list[str]) -> dict[s
             out["lens"] = "?"
     for section, *keys in FILES:
         _expand_paths(out, section, keys, folder)
+    output = out.get("output")
+    if isinstance(output, dict) and "://" not in str(output.get("ocio_config", "://")):
+        _expand_paths(out, "output", ["ocio_config"], folder)
     if "coating" in out:
         try:
             out["coating"] = expand_coating(out["coating"], folder)

@@ -225,13 +225,19 @@ def project_data(project: Project, folder: Path | None = None) -> dict[str, Any]
 
 
 def _make_relative(data: dict[str, Any], folder: Path) -> None:
+    # a reader goes up from where the folder really is
+    real = os.path.realpath(folder)
+
     def relative(name: str) -> str:
-        return Path(os.path.relpath(name, folder)).as_posix() if not Path(name).is_absolute() else name
+        return Path(os.path.relpath(os.path.abspath(name), real)).as_posix() if not Path(name).is_absolute() else name
 
     if isinstance(data["lens"], str) and lens_location(data["lens"], Path("x")) != data["lens"]:
         data["lens"] = relative(data["lens"])
         if "/" not in data["lens"] and not data["lens"].lower().endswith(LENS_SUFFIXES):
             data["lens"] = f"./{data['lens']}"
+    config = data["output"].get("ocio_config") if "output" in data else None
+    if config and "://" not in config:
+        data["output"] = {**data["output"], "ocio_config": relative(config)}
     hiding = [light["holdout"] for light in data["lights"] if "holdout" in light]
     tables = [(data[section], keys) for section, *keys in FILES if section in data]
     for table, keys in [*tables, *((table, HOLDOUT_FILES) for table in hiding)]:

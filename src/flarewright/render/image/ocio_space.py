@@ -57,6 +57,11 @@ def check_file_space(project: Project) -> tuple[str, ...]:
             "variances of reference quality cannot be converted to another colour space: choose rec709 or acescg, or "
             "another quality"
         )
+    if project.output.gamut == "compress":
+        raise ProjectError(
+            'gamut = "compress" moves colours into the primaries of rec709 or acescg, before they are converted to '
+            f"{project.output.ocio_space}: choose one of the two, or keep the gamut"
+        )
     _space(project)
     return ()
 
