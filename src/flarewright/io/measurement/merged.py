@@ -7,6 +7,7 @@ variance marks a pixel that was clipped in every exposure.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,15 @@ INDEX = "merged.json"
 # bytes; a frame takes about a kilobyte
 _LARGEST_INDEX = 64_000_000
 _RADIANCE, _VARIANCE = "radiance", "radiance.variance"
+
+
+def read_note(note: Path) -> dict[str, Any]:
+    """Return what a merge has noted beside a frame; empty when it cannot be read."""
+    try:
+        data = read_json(note, "the note of a frame")
+    except FileError:
+        return {}
+    return data if isinstance(data, dict) else {}
 
 
 def remove_index(folder: Path) -> None:

@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 from math import cos, radians, sin
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ...errors import FileError
 from ...io.files.atomic_write import make_folder, write_text_atomically
-from ...io.files.text_file import digest_of, read_json
-from ...io.measurement.merged import read_frame, remove_index, write_frame
+from ...io.files.text_file import digest_of
+from ...io.measurement.merged import read_frame, read_note, remove_index, write_frame
 from ...model.measurement.capture import FrameInfo, MergedFrame, MergedRun
 from ...typing import Floats, Pixels, Progress
 
@@ -61,9 +59,9 @@ def _write_upright(folder: Path, info: FrameInfo, here: FrameInfo) -> None:
     """Write a frame turned upright, unless it is there already: then later stages keep what they have made of it."""
     note, written = (folder / here.file).with_suffix(".json"), folder / here.file
     # what merging has noted of the frame: its digest, and the ratios of its exposures
-    about = _noted((folder / info.file).with_suffix(".json"))
+    about = read_note((folder / info.file).with_suffix(".json"))
     made_of = [about.get("sha256"), info.model_dump(mode="json")]
-    known = _noted(note)
+    known = read_note(note)
     if about.get("sha256") and known.get("of") == made_of and known.get("sha256") == digest_of(written):
         return
     remove_index(folder)
@@ -71,15 +69,6 @@ def _write_upright(folder: Path, info: FrameInfo, here: FrameInfo) -> None:
     write_frame(folder, MergedFrame(here, frame.radiance, frame.variance))
     facts = {"of": made_of, "sha256": digest_of(written), "ratios": about.get("ratios", [])}
     write_text_atomically(note, json.dumps(facts) + "\n")
-
-
-def _noted(note: Path) -> dict[str, Any]:
-    """Return the note of a frame; empty if there is none."""
-    try:
-        data = read_json(note, "the note of a frame")
-    except FileError:
-        return {}
-    return data if isinstance(data, dict) else {}
 
 
 def _upright_info(info: FrameInfo) -> FrameInfo:

@@ -20,11 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import FileError, FlarewrightError, OutputError
+from ...errors import FlarewrightError, OutputError
 from ...io.files.atomic_write import write_text_atomically
-from ...io.files.text_file import digest_of, read_json
+from ...io.files.text_file import digest_of
 from ...io.images.photo import open_photo
-from ...io.measurement.merged import read_frame, read_run, remove_index, write_frame, write_run
+from ...io.measurement.merged import read_frame, read_note, read_run, remove_index, write_frame, write_run
 from ...model.measurement.capture import OF_LIGHT, CameraNoise, Capture, FrameInfo, Matrix3, MergedFrame, MergedRun
 from ...sentences import count
 from ...typing import Progress, Report
@@ -214,7 +214,7 @@ def _refuse_other_run(output: Path, folder: Path, captures: Sequence[Capture], s
 
     The list can gain or lose photographs, and photographs can be moved, or converted again in the same folder.
     """
-    origins = [note["from"] for path in (output / FRAMES).glob("frame-*.json") if "from" in (note := _read_note(path))]
+    origins = [note["from"] for path in (output / FRAMES).glob("frame-*.json") if "from" in (note := read_note(path))]
     here = _origin(folder, captures)
     files = {tuple(one) for one in here["files"]}
     names = {name for name, *_ in files}
@@ -366,19 +366,10 @@ def _array_digest(array: np.ndarray[Any, Any] | None) -> str:
     return "" if array is None else hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()
 
 
-def _read_note(note: Path) -> dict[str, Any]:
-    """Return the note of a frame; empty when it cannot be read."""
-    try:
-        data = read_json(note, "the note of a frame")
-    except FileError:
-        return {}
-    return data if isinstance(data, dict) else {}
-
-
 def _kept_sighting(note: Path, digest: str, frame: Path, report: Report) -> LightSighting | None:
     """Return the sighting in a frame's note if the digest matches and the frame's file is whole."""
     try:
-        data = _read_note(note)
+        data = read_note(note)
         if data["digest"] != digest:
             return None
         size = frame.stat().st_size
