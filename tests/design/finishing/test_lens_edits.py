@@ -132,7 +132,7 @@ def zoom(gaps, **changes):
 
 @pytest.mark.parametrize("gaps", [((1, 10.0),), ((2, 6.0),), ((1, 10.0), (2, 6.0), (4, 5.0)), ((4, 5.0),)])
 def test_a_zoom_keeps_its_gaps_when_its_stop_moves(gaps):
-    """Rows were numbered anew, but not the gaps that move: the stop's own gap was lost, or glass called moving."""
+    """Rows got new numbers, but not the gaps that move: the stop's own gap was lost, or glass called moving."""
     lens = zoom(gaps)
     moved = move_stop(lens, 5)
     for before, after in zip(lens.positions, moved.positions, strict=True):

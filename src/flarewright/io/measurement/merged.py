@@ -36,7 +36,7 @@ def read_note(note: Path) -> dict[str, Any]:
 
 
 def remove_index(folder: Path) -> None:
-    """Delete the index of a run before its frames change: it would describe other pixels until it is written anew.
+    """Delete the index of a run before its frames change: it would describe other pixels until it is written again.
 
     Raises
     ------
