@@ -305,6 +305,23 @@ def test_a_cell_of_another_lens_is_not_written(tab):
     tab.until("flarewright.state.lens.rows[0].radius === '30'")
 
 
+def test_a_refused_cell_waits_for_its_correction(tab):
+    """It showed the old value, and came back over the correction that was being typed."""
+    tab.tab("lens")
+    box = tab.page.locator("input[data-row='0'][data-column='radius']")
+    box.fill("52.3x")
+    box.press("Enter")
+    tab.until("document.querySelector('.wrong').textContent !== ''")
+    assert box.input_value() == "52.3x"
+    assert "bad" in box.get_attribute("class")
+    box.fill("52.31")
+    # the next picture draws the panel again
+    tab.js("flarewright.refreshPanel()")
+    assert box.input_value() == "52.31"
+    box.press("Enter")
+    tab.until("flarewright.state.lens.rows[0].radius === '52.31'")
+
+
 def test_remarks_on_an_edited_cell_stay_visible(tab):
     tab.tab("lens")
     box = tab.page.locator("input[data-row='0'][data-column='semi_diameter']")

@@ -339,3 +339,33 @@ def test_what_was_noticed_in_a_file_goes_with_it_and_words_are_no_files(tab):
     x, y = box["x"] + 12, box["y"] + 8
     tab.drag((x, y), (x - 150, y - 60), hold_ms=40)
     assert tab.js("document.getElementById('drop').hidden")
+
+
+def test_a_dialog_closes_by_a_click_beside_it_only(tab):
+    """A click on its padding, or the end of a drag in its field, used to close it and lose what was typed."""
+    tab.page.click("#open")
+    tab.page.fill("dialog input", "some/where.toml")
+    box = tab.page.locator("dialog").bounding_box()
+    tab.page.mouse.click(box["x"] + 4, box["y"] + 4)
+    field = tab.page.locator("dialog input").first.bounding_box()
+    tab.page.mouse.move(field["x"] + 40, field["y"] + 8)
+    tab.page.mouse.down()
+    tab.page.mouse.move(box["x"] - 30, field["y"] + 8, steps=4)
+    tab.page.mouse.up()
+    assert tab.page.input_value("dialog input") == "some/where.toml"
+    tab.page.mouse.click(box["x"] - 30, box["y"] + 20)
+    tab.until("!document.querySelector('dialog')")
+
+
+def test_the_chosen_light_stays_chosen_when_undo_gives_it_another_number(tab):
+    for _ in range(2):
+        tab.js("flarewright.command('add_light', {})")
+    tab.until("flarewright.state.lights.length === 3")
+    names = [light["name"] for light in tab.state()["lights"]]
+    tab.js("flarewright.command('remove_light', {light: 0})")
+    tab.until("flarewright.state.lights.length === 2")
+    tab.js("flarewright.chooseLight(1)")
+    assert tab.state()["lights"][1]["name"] == names[2]
+    tab.page.click("#undo")
+    tab.until("flarewright.state.lights.length === 3")
+    assert tab.js("flarewright.state.lights[flarewright.light].name") == names[2]

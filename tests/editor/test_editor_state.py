@@ -26,6 +26,7 @@ from flarewright.io.lens.library import lens_path
 from flarewright.io.project.project_file import read_project
 from flarewright.model import BlackBody, Light, PerRow, Preset, QuarterWave, Stop, Surface
 from flarewright.optics.lens.paraxial import first_order
+from flarewright.optics.lens.zoom import at_position
 from flarewright.render.scene.resolve import open_lens, resolve_project
 
 
@@ -797,3 +798,46 @@ def test_the_spectra_of_the_page_are_found_again_by_their_text():
     keys = re.findall(r"\['([^']+)', '[^']+'\]", listed)
     assert len(keys) > 5
     assert [spectrum_text(parse_spectrum(key)) for key in keys] == keys
+
+
+def test_a_dropped_project_does_not_overwrite_the_file_of_the_one_before(tmp_path):
+    session, _ = begin(None)
+    mine = session.save(str(tmp_path / "mine"))
+    session.do("move_light", {"light": 0, "x": 4.0, "y": 2.0})
+    other = session.save(str(tmp_path / "other"))
+    session.open(str(mine))
+    take_in(session, "other.toml", other.read_bytes())
+    assert session.file is None
+    session.undo()
+    assert session.file == str(mine)
+    session.writer.close()
+
+
+def test_saving_names_no_project_before_it_was_opened(tmp_path):
+    session, _ = begin(None)
+    session.open("tessar-brendel")
+    path = session.save(str(tmp_path / "tessar"))
+    session.undo()
+    assert session.file is None
+    session.redo()
+    assert session.file == str(path)
+    session.writer.close()
+
+
+def test_a_solo_of_the_sensors_ghost_ends(project):
+    alone = do(project, "set_solo", names=["sensor-3"])
+    assert soloed(alone.art) == ("sensor-3",)
+    assert soloed(do(alone, "set_solo", names=["7-3"]).art) == ("7-3",)
+    assert do(alone, "set_solo", names=[]).art == project.art
+
+
+@pytest.mark.parametrize("row", [5, 15])
+def test_a_row_in_a_moving_gap_changes_no_position(project, row):
+    zoom = do(project, "choose_lens", lens="canon-70-200").replace(f_number=None)
+    lens = open_lens("canon-70-200").lens
+    moving = {k for k, _ in lens.positions[0].gaps}
+    row = sorted(moving)[0 if row == 5 else -1]
+    added = do(zoom, "add_row", row=row).lens
+    for before, after in zip(lens.positions, added.positions, strict=True):
+        efl = [first_order(at_position(one, position)).efl for one, position in ((lens, before), (added, after))]
+        assert efl[1] == pytest.approx(efl[0], rel=1e-9)

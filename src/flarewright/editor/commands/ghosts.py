@@ -85,7 +85,8 @@ def reset_art(project: Project) -> Project:
 def _is_solo(rule: Rule) -> bool:
     # exactly the rule of `set_solo`
     names = rule.select.removeprefix("not ")
-    return rule == Rule(select=f"not {names}", enable=False) and rule.select.startswith("not ") and names[:1].isdigit()
+    named = names[:1].isdigit() or names.startswith("sensor-")
+    return rule == Rule(select=f"not {names}", enable=False) and rule.select.startswith("not ") and named
 
 
 def _with(project: Project, rules: tuple[Rule, ...]) -> Project:

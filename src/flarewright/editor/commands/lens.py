@@ -151,7 +151,21 @@ def add_row(project: Project, row: int) -> Project:
     semi = old.semi_diameter if isinstance(old, Surface) else None
     front = old.replace(thickness=old.thickness - gap) if row + 1 < len(lens.rows) else old.replace(thickness=gap)
     new = Surface(thickness=gap, medium=medium, semi_diameter=semi)
-    return _renumbered(project, lens, (*lens.rows[:row], front, new, *lens.rows[row + 1 :]), _behind(row + 1))
+    added = _renumbered(project, lens, (*lens.rows[:row], front, new, *lens.rows[row + 1 :]), _behind(row + 1))
+    return _with_halved_gap(added, row)
+
+
+def _with_halved_gap(project: Project, row: int) -> Project:
+    """Give both halves of a divided gap half of it at every position that moves it."""
+    lens = project.lens
+    assert isinstance(lens, Lens), "rows are added to a lens of the project"
+    positions = []
+    for position in lens.positions:
+        gaps = dict(position.gaps)
+        if row in gaps:
+            gaps |= {row: 0.5 * gaps[row], row + 1: 0.5 * gaps[row]}
+        positions.append(position.replace(gaps=tuple(sorted(gaps.items()))))
+    return project if tuple(positions) == lens.positions else project.replace(lens=lens.replace(positions=positions))
 
 
 def duplicate_row(project: Project, row: int) -> Project:

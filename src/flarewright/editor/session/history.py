@@ -168,11 +168,11 @@ def exposed_entry(history: History) -> Moment | None:
 
 
 def filed(history: History, file: str | None) -> History:
-    """Set the file of the present state and of neighbouring states with the same file, as they are one project."""
-    old, first, last = history.file, history.at, history.at
-    while first > 0 and history.moments[first - 1].file == old:
+    """Set the file of the present state and of neighbouring states of the same project with the same file."""
+    moments, old, first, last = history.moments, history.file, history.at, history.at
+    while first > 0 and not moments[first].begins and moments[first - 1].file == old:
         first -= 1
-    while last + 1 < len(history.moments) and history.moments[last + 1].file == old:
+    while last + 1 < len(moments) and not moments[last + 1].begins and moments[last + 1].file == old:
         last += 1
     own = tuple(replace(moment, file=file) for moment in history.moments[first : last + 1])
     return replace(history, moments=(*history.moments[:first], *own, *history.moments[last + 1 :]))

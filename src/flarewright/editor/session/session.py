@@ -115,7 +115,9 @@ class Session:
             if not begins and not placed:
                 project = _on_plate(self.project, project)
             self.reach.check_project(project, self.project)
-            self._move(past.committed(self.history, project, label, file=self.file, begins=begins, look=look))
+            # another project has no file yet: that of the one before must not be overwritten
+            file = None if begins and project != self.project else self.file
+            self._move(past.committed(self.history, project, label, file=file, begins=begins, look=look))
 
     def _check_lens(self, name: str, values: dict[str, Any]) -> None:
         """Check the path of a lens before it is read."""

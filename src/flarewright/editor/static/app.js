@@ -40,7 +40,10 @@ function take(state) {
   plain = structuredClone(state);
   Object.assign(state.view, asked);
   app.state = state;
-  app.light = Math.min(app.light, state.lights.length - 1);
+  // after undo, the chosen light may have another number
+  const chosen = old?.lights[app.light]?.name;
+  const named = state.lights.flatMap((light, k) => (light.name === chosen ? [k] : []));
+  app.light = named.length === 1 ? named[0] : Math.min(app.light, state.lights.length - 1);
   // end a drag whose light was removed: its number may be that of another light now
   const dragged = app.view.drag?.light;
   if (old && dragged !== undefined && old.lights[dragged]?.name !== state.lights[dragged]?.name) { app.view.drag = null; app.view.letGo(); }

@@ -31,7 +31,7 @@ export function lensPanel(app) {
   let drawn = '';
   const search = latest(async (words) => { glasses.replaceChildren(...(await get(`api/glasses?q=${encodeURIComponent(words)}`)).glasses.map((name) => h('option', { value: name }))); });
 
-  async function write(box, row, column, text, table) {
+  async function write(row, column, text, table) {
     refused = null;
     drawn = '';
     written = { row, table };
@@ -43,15 +43,12 @@ export function lensPanel(app) {
         draw(app.state);
         return;
       }
+      // the table that is drawn next shows what was refused, unless the cell does not exist any more
+      refused = state.lens.table === table ? { row, column, text, why: sentence(error.message) } : null;
       app.take(state);
-      if (app.table() !== table) {
-        // the cell does not exist any more
-        draw(app.state);
-        wrong.textContent = sentence(error.message);
-        return;
-      }
-      refused = { row, column, text, why: sentence(error.message) };
-      mark(box);
+      if (app.table() !== table) { refused = null; drawn = ''; }
+      draw(app.state);
+      wrong.textContent = sentence(error.message);
     }
   }
   function mark(box) {
@@ -66,10 +63,10 @@ export function lensPanel(app) {
     // round an estimate to the digits that fit
     const value = guess ? Number(line[column]).toFixed(2) : line[column] ?? '';
     const box = h('input', { type: 'text', value, tip: note, class: `${note ? 'note' : ''} ${guess ? 'guess' : ''}`, 'aria-label': `Row ${line.row}, ${COLUMNS.find(([key]) => key === column)[1]}`, 'data-row': line.row, 'data-column': column, spellcheck: 'false', list: column === 'glass' ? 'glasses' : null });
-    if (refused && refused.row === line.row && refused.column === column) { box.value = refused.text; mark(box); }
+    if (refused && refused.row === line.row && refused.column === column) { box.value = refused.text; box.defaultValue = refused.text; mark(box); }
     box.addEventListener('focus', () => { app.row = line.row; choose(); if (column === 'glass') search(box.value); box.select(); });
     box.addEventListener('input', () => { if (column === 'glass') search(box.value); });
-    box.addEventListener('change', () => { const text = box.value; box.defaultValue = text; write(box, line.row, column, text, table); });
+    box.addEventListener('change', () => { const text = box.value; box.defaultValue = text; write(line.row, column, text, table); });
     box.addEventListener('keydown', (event) => {
       if (event.key === 'Escape') { refused = null; wrong.textContent = ''; box.value = value; box.defaultValue = value; box.classList.remove('bad'); drawn = ''; box.blur(); draw(app.state); event.stopPropagation(); }
       const step = { ArrowDown: 1, ArrowUp: -1, Enter: 1 }[event.key];
@@ -87,7 +84,7 @@ export function lensPanel(app) {
     const active = document.activeElement;
     const here = active && body.contains(active) && active.dataset.column ? { row: active.dataset.row, column: active.dataset.column } : null;
     // keep a field while the user types in it; redraw the table afterwards
-    if (here && active.value !== active.defaultValue && !active.classList.contains('bad')) { active.addEventListener('blur', () => draw(app.state), { once: true }); return; }
+    if (here && active.value !== active.defaultValue) { active.addEventListener('blur', () => draw(app.state), { once: true }); return; }
     drawn = key;
     body.replaceChildren(...state.lens.rows.map((line) => {
       const first = h('td', { onclick: () => { app.row = line.row; choose(); app.panels.coating.rowChosen?.(); }, tip: Object.values(line.notes).join(' ') || null }, String(line.row));

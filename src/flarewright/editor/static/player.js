@@ -55,9 +55,18 @@ export function player(app) {
     if (self.keyed()) show(); else self.heard();
   };
   // consecutive moves form one step of the history
-  self.rest = () => (self.keyed() ? app.view.settle('go_to', { at_s: Number(self.at.toFixed(3)) }, 'go_to') : Promise.resolve());
+  self.rest = () => {
+    if (self.keyed()) return app.view.settle('go_to', { at_s: Number(self.at.toFixed(3)) }, 'go_to');
+    // no light moves, so nothing is stored, and pictures of the project are shown again
+    app.view.letGo();
+    return Promise.resolve();
+  };
   self.go = (at) => { self.playing = false; self.at = Math.max(0, at); self.heard(); return self.rest(); };
-  self.key = () => app.command('set_key', { light: app.light, at_s: Number(self.at.toFixed(2)) }).catch(() => {});
+  self.key = async () => {
+    // the place that is shown, not that of before playback
+    if (self.playing) await self.stop();
+    return app.command('set_key', { light: app.light, at_s: Number(self.at.toFixed(2)) }).catch(() => {});
+  };
   self.step = (by) => {
     const times = [...new Set(app.state.lights.flatMap((light) => light.keys.map((key) => key.at_s)))].sort((a, b) => a - b);
     const next = by > 0 ? times.find((at) => at > self.at + 0.005) : times.reverse().find((at) => at < self.at - 0.005);

@@ -205,7 +205,14 @@ export function press(element, on) {
 export function dialog(title, ...content) {
   const box = h('dialog', { 'aria-label': title }, h('h2', {}, title), ...content);
   box.addEventListener('close', () => box.remove());
-  box.addEventListener('click', (event) => { if (event.target === box) box.close(); });
+  // a click beside the dialog closes it; its own padding, and the end of a drag that began within, do not
+  const beside = (event) => {
+    const { left, top, right, bottom } = box.getBoundingClientRect();
+    return event.target === box && (event.clientX < left || event.clientX > right || event.clientY < top || event.clientY > bottom);
+  };
+  let pressed = false;
+  box.addEventListener('pointerdown', (event) => { pressed = beside(event); });
+  box.addEventListener('click', (event) => { if (pressed && beside(event)) box.close(); });
   document.body.append(box);
   box.showModal();
   return box;
