@@ -100,3 +100,23 @@ def test_a_light_s_path_through_the_picture_leaves_the_scale(folder):
         assert run([*SMALL, "--light", place, *words]) == 0
         scales.append(read_exr("a.exr").scale)
     assert scales == [2.0**-7] * 2
+
+
+def test_a_flag_without_effect_on_the_scatter_of_a_project_is_refused(capsys, folder):
+    text = 'lens = "heliar-tronnier"\n[[lights]]\nfield_deg = [10, 5]\n[scatter]\nmodel = "abg"\n'
+    (folder / "p.toml").write_text(text)
+    assert run(["render", "--project", "p.toml", "--surface-roughness", "50", "-o", "a.exr"]) == 2
+    assert "--surface-roughness has no effect on the scatter of the project, abg" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ('[quality]\nmode = "reference"\n[output]\nmatte = "ghosts"\n', "a matte needs each ghost alone"),
+        ('[output]\nocio_space = "ACEScg"\nocio_config = "none.ocio"\n', "none.ocio"),
+    ],
+)
+def test_a_project_that_cannot_be_rendered_is_not_usable(capsys, folder, lines, words):
+    (folder / "p.toml").write_text(f'lens = "heliar-tronnier"\n[[lights]]\nfield_deg = [10, 5]\n{lines}')
+    assert run(["project", "check", "p.toml"]) == 2
+    assert words in capsys.readouterr().err

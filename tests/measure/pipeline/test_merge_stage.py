@@ -15,6 +15,7 @@ from flarewright.io.measurement.captures import read_captures
 from flarewright.io.measurement.merged import read_frame, read_run
 from flarewright.measure.merging.camera_geometry import SightingInput, solve_geometry
 from flarewright.measure.merging.light_position import find_light
+from flarewright.measure.merging.noise import noise_of
 from flarewright.measure.merging.settings import MergeSettings
 from flarewright.measure.pipeline.merge_stage import merge_captures, merge_frame
 from flarewright.measure.pipeline.provenance import run_digest
@@ -637,3 +638,24 @@ def test_a_faint_light_whose_place_is_given_is_found(tmp_path):
     run = merge_captures(placed, tmp_path, tmp_path / "run", camera=KNOWN)
     assert all(frame.light_found for frame in run.frames)
     assert run.frames[-1].light_px == pytest.approx(light_px(ANGLES[-1]), abs=0.2)
+
+
+def test_dark_frames_of_another_iso_do_not_enter_the_noise(tmp_path):
+    captures = shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES})
+    unknown = KNOWN.replace(electrons_per_unit=None, read_noise=None)
+    alone = merge_captures(read_captures(captures), tmp_path, tmp_path / "alone", camera=unknown).camera
+    for k in range(2):
+        dark = expose(CAMERA, np.zeros((64, 96, 3), np.float32), 0.125, 1.0, (7, k))
+        # the noise of a fourfold ISO
+        np.save(tmp_path / f"dark-{k}.npy", np.clip(4 * (dark.astype(int) - CAMERA.black) + CAMERA.black, 0, 65535))
+        with captures.open("a") as listed:
+            listed.write(f"dark-{k}.npy,,0.125,400,8,dark\n")
+    with_darks = merge_captures(read_captures(captures), tmp_path, tmp_path / "darks", camera=unknown).camera
+    assert with_darks.electrons_per_unit == pytest.approx(alone.electrons_per_unit, rel=0.05)
+    assert with_darks.read_noise == pytest.approx(alone.read_noise, rel=0.2)
+
+
+def test_a_simulation_without_noise_merges(tmp_path):
+    """Dark pixels had an infinite weight."""
+    camera = CameraNoise(electrons_per_unit=100.0, read_noise=0.0, iso=100.0)
+    assert noise_of(camera, 100.0, 0.0).floor > 0.0

@@ -5,6 +5,7 @@ import json
 import signal
 
 import numpy as np
+import OpenEXR
 import pytest
 from planted_residual import CAPTURED, TRUE
 from planted_run import LARGEST, SIZE, views
@@ -318,3 +319,14 @@ def test_a_ghost_comes_and_goes_between_the_captures_that_show_it_and_those_that
     for angle, part in ((5.0, 0.0), (5.25, 0.25), (5.5, 0.5), (6.0, 1.0), (12.0, 1.0), (12.75, 0.25), (13.0, 0.0)):
         there, all_of_it = (float(replay_model(each, angle)[0].pixels.sum()) for each in (model, always))
         assert there == pytest.approx(part * all_of_it, rel=1e-4, abs=1e-6)
+
+
+@pytest.mark.parametrize("rec709", [False, True])
+def test_only_a_converted_replay_states_rec709(tmp_path, rec709):
+    """Other programs take stated primaries for true, and a camera's own colours have none."""
+    write_ghost_model(tmp_path / "model.json", planted().replace(to_rec709=((1.1, -0.1, 0), (0, 1, 0), (0, 0, 1))))
+    words = ["--constellation", "8", "--size", "80x45", "-o", str(tmp_path / "o.exr"), *(["--rec709"] * rec709)]
+    assert run(["measure", "replay", str(tmp_path / "model.json"), *words]) == 0
+    with OpenEXR.File(str(tmp_path / "o.exr")) as file:
+        header = set(file.parts[0].header)
+    assert ({"chromaticities", "colorInteropID"} <= header, "chromaticities" in header) == (rec709, rec709)

@@ -153,3 +153,10 @@ def test_a_shot_is_drawn_again_for_another_space_and_makes_no_film_of_it(ocio, t
     assert shot(project("ACEScg", **settings), names, frames="1", processes=1).frames[0].drawn
     with pytest.raises(ProjectError, match=r"a film is made of frames in Rec\.709 or ACEScg"):
         shot(wanted, names, frames="1", movie=tmp_path / "f.mp4")
+
+
+def test_colours_are_not_compressed_into_other_primaries_than_those_of_the_file(ocio):
+    made = project("ACEScg")
+    compressed = made.replace(output=made.output.replace(gamut="compress"))
+    with pytest.raises(ProjectError, match='gamut = "compress" moves colours into the primaries of rec709 or acescg'):
+        check_file_space(compressed)
