@@ -606,7 +606,7 @@ def test_a_merge_that_fails_leaves_no_index_of_other_pixels(tmp_path):
 
 
 def test_upright_frames_are_kept(tmp_path):
-    """They were written anew by every merge, so every later stage began from the start."""
+    """Every merge wrote them again, so every later stage began from the start."""
     captures = read_captures(shoot(tmp_path, {angle: star(light_px(angle)) for angle in ANGLES}))
     run, settings = tmp_path / "run", MergeSettings(upright=True)
     first = merge_captures(captures, tmp_path, run, camera=KNOWN, settings=settings)

@@ -12,6 +12,7 @@ from ...errors import LensError, ProjectError
 from ...kernels.design import ghosts as columns
 from ...model import Lens, Position, Stop, Surface
 from ...optics.lens.paraxial import FirstOrder, first_order
+from ...optics.lens.zoom import gaps_without_row
 from ...render.scene.resolve import complete_lens
 from ...sentences import INVALID, validation_sentences
 from ...typing import Floats
@@ -281,12 +282,5 @@ def move_stop(lens: Lens, row: int) -> Lens:
 
 def _without_row(lens: Lens, old: int) -> tuple[Position, ...]:
     """Return a lens' positions without one of its rows, whose gaps in front and behind become one."""
-    found = []
-    for position in lens.positions:
-        at = dict(position.gaps)
-        gaps = {k if k < old else k - 1: gap for k, gap in at.items() if k not in (old - 1, old)}
-        if 0 < old < len(lens.rows) - 1 and at.keys() & {old - 1, old}:
-            gaps[old - 1] = sum(at.get(k, lens.rows[k].thickness) for k in (old - 1, old))
-        if gaps:
-            found.append(position.replace(gaps=tuple(sorted(gaps.items()))))
-    return tuple(found)
+    moved = ((position, gaps_without_row(lens, position, old)) for position in lens.positions)
+    return tuple(position.replace(gaps=tuple(sorted(gaps.items()))) for position, gaps in moved if gaps)

@@ -18,6 +18,7 @@ from ...model import AsLens, CoatingChoice, Iris, Lens, PerRow, Position, Preset
 from ...model.project.art import Art
 from ...optics.lens.paraxial import FirstOrder, first_order
 from ...optics.lens.surface_shape import sag
+from ...optics.lens.zoom import gaps_without_row
 from ...optics.rays.image_height import image_heights
 from ...render.scene.photographic_defaults import as_photographed, plausible_preset
 from ...render.scene.resolve import open_lens
@@ -272,14 +273,7 @@ def _room_behind_stop(rows: list[Row], target: int) -> float:
 
 def _with_stop_at(position: Position, lens: Lens, target: int, behind: float) -> Position:
     """Return the gaps of a zoom position for another place of the stop; the stop moves with the row behind it."""
-    old = lens.stop_row
-    gaps = dict(position.gaps)
-    if old in gaps or old - 1 in gaps:
-        both = (gaps.pop(k, lens.rows[k].thickness) for k in (old - 1, old) if k >= 0)
-        total = sum(both)
-        if old > 0:
-            gaps[old - 1] = total
-    gaps = {k - (k > old): gap for k, gap in gaps.items()}
+    gaps = gaps_without_row(lens, position, lens.stop_row)
     if target - 1 in gaps:
         gaps[target - 1] -= behind
         if gaps[target - 1] < 0.0:

@@ -39,6 +39,30 @@ def at_position(lens: Lens, position: Position) -> Lens:
     return lens.replace(**changes)
 
 
+def gaps_without_row(lens: Lens, position: Position, row: int) -> dict[int, float]:
+    """Return the gaps that a position moves, by row, after one row is removed.
+
+    Parameters
+    ----------
+    lens : Lens
+    position : Position
+        Of this lens.
+    row : int
+        The gaps in front of it and behind it become one; in front of row 0 there is none.
+
+    Returns
+    -------
+    dict of int to float
+        Keys in the new numbers. A gap in front of the last row would change the place of the sensor: it stays, behind
+        the last row, where no lens may have it.
+    """
+    at = dict(position.gaps)
+    gaps = {k - (k > row): gap for k, gap in at.items() if k not in (row - 1, row)}
+    if row > 0 and at.keys() & {row - 1, row}:
+        gaps[row - 1] = sum(at.get(k, lens.rows[k].thickness) for k in (row - 1, row))
+    return gaps
+
+
 def positioned(lens: Lens, zoom: str | float | None, distance: float | None) -> Lens:
     """Return a lens at a zoom and a focus setting.
 

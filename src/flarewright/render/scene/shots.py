@@ -11,7 +11,7 @@ from ...model import Light, Project, Quality
 from ...optics.colour.spectrum import covers_all_lines, sampled_wavelengths, traced_wavelengths
 from ...optics.pupil.light_shape import parts
 from ...optics.pupil.polygon import closed
-from ...optics.rays.bundle import Incidence, incidence
+from ...optics.rays.bundle import incidence
 from ...optics.rays.pack import PackedLens, facing, resolve_coatings
 from ...optics.rays.path_reflectance import BandCurves, coating_curves
 from .between_wavelengths import Between, lens_between
@@ -66,11 +66,11 @@ def make_shots(settled: ResolvedProject, opening: Opening, *, sampled: bool = Fa
         of_light, bands, between_them = packs[key]
         whole = []
         distance = distance_in_front(settled, of_light, number)
+        near = light if distance == light.distance else light.replace(distance=distance)
         for part in parts(light, quality.source_step_deg, most_parts(quality)):
             changes = {"field_deg": part.field_deg, "intensity": light.intensity * part.share, "holdout": None}
-            point = light.replace(**changes, diameter_deg=0.0, shape=None) if light.extended else light
-            point = point if distance == light.distance else point.replace(distance=distance)
-            seen = _seen(settled, point)
+            point = near.replace(**changes, diameter_deg=0.0, shape=None) if light.extended else near
+            seen = incidence(point.field_deg, distance, settled.order.entrance_pupil_z)
             packed = facing(of_light, seen.axes, seen.nearness)
             whole.append(
                 Shot(
@@ -114,10 +114,3 @@ def _unhidden(settled: ResolvedProject, light: Light, whole: list[Shot]) -> list
     plates = read_plates(settled.project, light)
     seen = [shot for part in whole if (shot := seen_part(settled.lens, part, plates)) is not None]
     return seen or [replace(whole[0], light=whole[0].light.replace(intensity=0.0), share=0.0, border=None)]
-
-
-def _seen(settled: ResolvedProject, light: Light) -> Incidence:
-    """Return the incidence of a light, whose distance is from the first row."""
-    if light.distance is None:
-        return incidence(light.field_deg)
-    return incidence(light.field_deg, light.distance, settled.order.entrance_pupil_z)
