@@ -444,6 +444,8 @@ COMMAND_LINES = {
     "ghosts of three orders": (["ghosts", "heliar-tronnier", "--light", "1,1", "--orders", "3"], "should be 2 or 4"),
     "ghosts below no limit": (["ghosts", "heliar-tronnier", "--light", "1,1", "--orders", "4", "--order4-limit", "nan"],
                               "--order4-limit should be a finite number"),
+    "ghosts of two with a limit of four": (
+        ["ghosts", "heliar-tronnier", "--light", "1,1", "--order4-limit", "1e-3"], "add --orders 4, or leave it out"),
     "focus and sensor distance": (
         [*H, *GOOD, "--focus", "900", "--sensor-distance", "80"], "--focus and --sensor-distance both place"),
     "blades beside an iris image": (

@@ -111,6 +111,31 @@ def test_undo_while_a_path_plays_can_be_done_again(tab):
     assert tab.state()["steps"] == steps
 
 
+def test_two_numbers_typed_before_the_first_answer_both_count(tab):
+    """The second used to be sent together with the old value of the first."""
+    tab.js("flarewright.command('set_key', {light: 0, at_s: 0})")
+    tab.js("flarewright.command('set_key', {light: 0, at_s: 3, field_deg: [-4, -2]})")
+    tab.until("flarewright.state.lights[0].keys.length === 2")
+    delay(tab)
+    tab.page.fill("input[name=light_x]", "3.5")
+    tab.page.fill("input[name=light_y]", "-1.25")
+    tab.page.press("input[name=light_y]", "Enter")
+    tab.until("flarewright.state.lights[0].field_deg.join() === '3.5,-1.25'")
+    # a key that is moved behind another one is the same key
+    for name, value in (("seconds", "4.5"), ("right", "7"), ("up", "2.5")):
+        tab.page.fill(f"input[name=key_{name}_0]", value)
+    tab.page.press("input[name=key_up_0]", "Enter")
+    tab.until("flarewright.state.lights[0].keys.at(-1).field_deg.join() === '7,2.5'")
+    keys = tab.state()["lights"][0]["keys"]
+    assert [(key["at_s"], key["field_deg"]) for key in keys] == [(3.0, [-4.0, -2.0]), (4.5, [7.0, 2.5])]
+    tab.page.select_option("select[name=light_shape]", "rectangle")
+    tab.until("flarewright.state.lights[0].shape")
+    tab.page.fill("input[name=light_width]", "2")
+    tab.page.fill("input[name=light_height]", "5")
+    tab.page.press("input[name=light_height]", "Enter")
+    tab.until("flarewright.state.lights[0].shape.size_deg.join() === '2,5'")
+
+
 def test_a_light_added_while_a_path_plays_is_no_error_of_the_page(tab):
     """The pictures on their way lack it, which used to be a message of the script: "Cannot read properties"."""
     tab.js("flarewright.command('set_key', {light: 0, at_s: 0})")

@@ -547,6 +547,17 @@ def test_rows_come_and_go_with_everything_that_counts_them(project):
     assert do(project, "set_lens_facts", values={"name": "Mine"}).lens.name == "Mine"
 
 
+def test_a_row_removed_beside_a_moving_gap_leaves_every_position_its_length():
+    """The gap in front of the removed row used to stay as short as before at the zoom's positions."""
+    project = begin("canon-70-200")[0].project
+    lens = own_lens(project)
+    row = next(row for row, _ in lens.positions[0].gaps if row > 0 and row + 1 < len(lens.rows))
+    longer = do(project, "add_row", row=row)
+    shorter = own_lens(do(longer, "remove_row", row=row + 1))
+    for old, new in zip(lens.positions, shorter.positions, strict=True):
+        assert dict(new.gaps) == pytest.approx(dict(old.gaps))
+
+
 @pytest.mark.parametrize(
     ("name", "every"),
     [("canon-70-200", 11), pytest.param("canon-70-200", 1, marks=pytest.mark.slow), ("nikkor-85-f1.4", 1),

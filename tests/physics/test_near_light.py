@@ -1,5 +1,6 @@
 """A light at a finite distance: limits, Gauss' equation, the inverse square law, and two other tracers."""
 
+import re
 from math import cos, hypot, pi, radians, sqrt, tan
 
 import numpy as np
@@ -15,9 +16,10 @@ from flarewright.optics.lens.dispersion import D_LINE_NM
 from flarewright.optics.lens.paraxial import first_order, path_matrices
 from flarewright.optics.lens.paths import direct_path, ghost_path
 from flarewright.optics.rays.bundle import incidence, trace_points
+from flarewright.optics.rays.ghost_table import GhostQuery
 from flarewright.optics.rays.pack import facing, pack_lens
 from flarewright.optics.rays.pupil_region import front_box
-from flarewright.render.analysis import ghosts
+from flarewright.render.analysis import find_ghosts, ghosts
 from flarewright.render.reference.energy_ledger import trace_ledger
 from flarewright.render.render import render
 from flarewright.render.scene.direct_image import defocus_mm, direct_image, traced_spot
@@ -221,6 +223,21 @@ def test_a_light_in_the_lens_is_refused():
         ghosts(hollow, (0.0, 0.0), distance=0.9 * sag)
     for near, whole in ((1.2 * sag, hollow), (0.9 * sag, a_lens)):
         shot_of(project(near, f_number=None).replace(lens=whole))
+
+
+def test_the_distances_in_a_message_count_from_the_lens_as_the_given_one_does():
+    """They used to count from a filter in front, so that the stated remedy was refused too."""
+    a_lens, _ = shot_of(project(None, name="canon-28-80", f_number=None))
+    rows = list(a_lens.rows)
+    rows[0] = rows[0].replace(curvature=-0.02 * rows[0].curvature)
+    settled = resolve_project(project(None, f_number=None).replace(lens=a_lens.replace(rows=tuple(rows))))
+    query = GhostQuery((0.0, 0.0), 1e-3, D_LINE_NM, "all")
+    said = []
+    for ahead in (0.0, 8.0):
+        with pytest.raises(ProjectError) as refused:
+            find_ghosts(settled.lens, settled.order, settled.coating, query, ahead=ahead)
+        said.append([float(text) for text in re.findall(r"([0-9.]+) mm", str(refused.value))])
+    assert said[1] == pytest.approx([distance + 8.0 for distance in said[0]], abs=1e-3)
 
 
 @pytest.mark.parametrize("cats_eye", [False, True])

@@ -11,14 +11,14 @@ from ..io.lens.coating_text import coating_choice
 from ..model import Coating, CoatingChoice, Imperfection, Lens, Plate
 from ..optics.lens.dispersion import D_LINE_NM
 from ..optics.lens.paraxial import FirstOrder, first_order
-from ..optics.rays.bundle import least_distance
+from ..optics.lens.plane_plates import filter_length
 from ..optics.rays.ghost_table import GhostQuery, GhostTable, ghost_table, pack_for_query
 from ..optics.rays.pack import SensorMirror
 from ..typing import Progress
 from .analysis_memory import AnalysisMemory, AnalysisPart
 from .image.partial_picture import digest_of
 from .progress_parts import progress_parts
-from .scene.resolve import build, check_opens, distance_from_front, open_lens
+from .scene.resolve import build, check_in_front, check_opens, distance_from_front, open_lens
 
 # time of the search for paths of four reflections, and of the ghosts
 _WEIGHTS = {"search": 1.0, "ghosts": 9.0}
@@ -122,7 +122,8 @@ def ghosts(
     if distance is not None:
         distance = distance_from_front(distance, filter_plate, "distance")
     query = GhostQuery(field_deg, distance, wavelength_nm, paths, sensor, orders, order4_limit)
-    table, found = find_ghosts(built.lens, order, built.coating, query, threads=threads)
+    ahead = filter_length(filter_plate)
+    table, found = find_ghosts(built.lens, order, built.coating, query, ahead=ahead, threads=threads)
     if remarks is not None:
         remarks += (*opened.remarks, *built.remarks, *found)
     return table
@@ -134,6 +135,7 @@ def find_ghosts(
     coating: CoatingChoice,
     query: GhostQuery,
     *,
+    ahead: float = 0.0,
     threads: int | None = None,
     progress: Progress | None = None,
     memory: AnalysisMemory | None = None,
@@ -148,6 +150,8 @@ def find_ghosts(
         At the opening and focus to be used.
     coating : CoatingChoice
     query : GhostQuery
+    ahead : float
+        Length of the filter in front of the lens, mm: errors state the distance of the light from the lens.
     threads : int, optional
     progress : callable, optional
         Called with the finished fraction (0 to 1) and a description.
@@ -170,11 +174,7 @@ def find_ghosts(
             f"orders are 2 or 4, not {query.orders}, and their limit lies between 0 and 1: {query.order4_limit:g}"
         )
     packed = pack_for_query(lens, order, coating, query)
-    if query.distance is not None and not query.distance > least_distance(packed):
-        raise ProjectError(
-            f"a light at {query.distance:g} mm stands in the lens {lens.name} or behind its entrance pupil; "
-            f"give more than {least_distance(packed):.4g} mm"
-        )
+    check_in_front(packed, query.distance, lens.name, ahead)
     part = AnalysisPart() if memory is None else memory.part(digest_of(__version__, lens, packed, query))
     if query.orders == 2:
         return ghost_table(lens, packed, query, threads=threads, progress=progress, measured=part.rows), ()

@@ -8,6 +8,7 @@ from itertools import groupby, product
 from math import hypot
 
 from ..model import Project
+from ..optics.lens.plane_plates import filter_length
 from ..optics.rays.ghost_table import GhostQuery, GhostTable
 from ..render.analysis import find_ghosts
 from ..render.analysis_memory import AnalysisMemory
@@ -112,7 +113,7 @@ def sweep_ghosts(
         for _, field_deg, wavelength_nm in points:
             asked = replace(query, field_deg=field_deg, wavelength_nm=wavelength_nm)
             table, _ = find_ghosts(
-                settled.lens, settled.order, settled.coating, asked, memory=memory,
+                settled.lens, settled.order, settled.coating, asked, ahead=filter_length(project.filter), memory=memory,
                 progress=_of_point(progress, done, number),
             )  # fmt: skip
             done += 1

@@ -95,8 +95,9 @@ class GhostsOptions:
     ] = None
     orders: Annotated[int, typer.Option(help="Reflections: 4 also lists ghosts of four (default: 2).")] = 2
     order4_limit: Annotated[
-        float, typer.Option(help="List those above this fraction of the two-reflection light (default: 1e-4).")
-    ] = 1e-4
+        float | None,
+        typer.Option(help="List those of four above this fraction of the two-reflection light (default: 1e-4)."),
+    ] = None
     glare: Annotated[bool, typer.Option("--glare", help="Also print the veiling glare index.")] = False
     scatter: Annotated[
         str | None, typer.Option(metavar="MODEL", help="For --glare: none, harvey-shack, abg, chaumond.")
@@ -130,6 +131,7 @@ def ghosts(options: GhostsOptions) -> None:
     # the flags are checked before anything slow is imported
     project_with = _project_of(options)
 
+    from ...optics.lens.plane_plates import filter_length
     from ...optics.rays.ghost_table import GhostQuery
     from ...optics.rays.pack import SensorMirror
     from ...render.analysis import find_ghosts
@@ -157,8 +159,9 @@ def ghosts(options: GhostsOptions) -> None:
     with _kept(options, settled, query) as memory:
         with one_bar("ghosts") as progress:
             table, found = find_ghosts(
-                settled.lens, settled.order, settled.coating, query, progress=progress, memory=memory
-            )
+                settled.lens, settled.order, settled.coating, query, ahead=filter_length(project.filter),
+                progress=progress, memory=memory,
+            )  # fmt: skip
         if options.glare:
             with one_bar("veiling glare") as progress:
                 veil = kept_glare(project, options.wavelength_nm, progress=progress)
@@ -195,6 +198,7 @@ def _project_of(options: GhostsOptions) -> Callable[[Lens], Project]:
     if not (math.isfinite(wavelength_nm) and 380.0 <= wavelength_nm <= 780.0):
         raise ProjectError(f"--wavelength-nm {wavelength_nm:g} is not visible light; choose one between 380 and 780 nm")
     in_front, behind, imperfection = options.filter_plate, options.cover_glass, options.imperfection
+    limit = {} if options.order4_limit is None else {"order4_limit": options.order4_limit}
     settings = {
         "coating": parse_coating_choice(options.coating),
         "f_number": chosen_fstop(options.fstop),
@@ -209,7 +213,7 @@ def _project_of(options: GhostsOptions) -> Callable[[Lens], Project]:
         "imperfection": None if imperfection is None else parse_imperfection(imperfection),
         "scatter": scatter_flags(options.scatter, options.surface_roughness, options.cleanliness),
         "lights": ({"field_deg": angles, "distance": None if options.distance == math.inf else options.distance},),
-        "quality": {"paths": options.paths, "orders": options.orders, "order4_limit": options.order4_limit},
+        "quality": {"paths": options.paths, "orders": options.orders, **limit},
         "zoom": options.zoom,
     }
     if options.as_csv and (options.as_json or options.glare):
@@ -217,6 +221,8 @@ def _project_of(options: GhostsOptions) -> Callable[[Lens], Project]:
             f"--csv prints a table of ghosts, which cannot hold {'--json' if options.as_json else '--glare'}; keep one"
         )
     _check_sweep(options)
+    if options.orders == 2 and limit:
+        raise ProjectError("--order4-limit is for ghosts of four reflections only; add --orders 4, or leave it out")
     if settings["scatter"] is not None and not options.glare:
         raise ProjectError("--scatter, --surface-roughness and --cleanliness change the glare only; add --glare")
     return lambda lens: project_of({"lens": lens, **settings})

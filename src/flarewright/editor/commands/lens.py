@@ -160,13 +160,13 @@ def _with_halved_gap(project: Project, row: int) -> Project:
     """Give both halves of a divided gap half of it at every position that moves it."""
     lens = project.lens
     assert isinstance(lens, Lens), "rows are added to a lens of the project"
-    positions = []
+    halved = []
     for position in lens.positions:
         gaps = dict(position.gaps)
         if row in gaps:
             gaps |= {row: 0.5 * gaps[row], row + 1: 0.5 * gaps[row]}
-        positions.append(position.replace(gaps=tuple(sorted(gaps.items()))))
-    return project if tuple(positions) == lens.positions else project.replace(lens=lens.replace(positions=positions))
+        halved.append(_with_gaps(position, gaps))
+    return _with_positions(project, tuple(halved))
 
 
 def duplicate_row(project: Project, row: int) -> Project:
@@ -190,7 +190,10 @@ def remove_row(project: Project, row: int) -> Project:
     last = rows[-1]
     if row == len(rows) and isinstance(last, Surface):
         rows[-1] = last.replace(medium=None)
-    return _renumbered(project, lens, tuple(rows), lambda k: None if k == row else k - (k > row))
+    positions = tuple(_with_gaps(position, gaps_without_row(lens, position, row)) for position in lens.positions)
+    still = lens.replace(positions=())
+    shorter = _renumbered(project, still, tuple(rows), lambda k: None if k == row else k - (k > row))
+    return _with_positions(shorter, positions)
 
 
 def move_stop(project: Project, row: int) -> Project:
@@ -247,13 +250,22 @@ def move_stop(project: Project, row: int) -> Project:
     positions = tuple(_with_stop_at(position, lens, target, behind) for position in lens.positions)
     still = lens.replace(positions=(), sensor_distance=sensor)
     moved = _renumbered(project, still, tuple(left), place)
+    return _with_positions(moved, positions)
+
+
+def _with_positions(project: Project, positions: tuple[Position, ...]) -> Project:
+    """Give the project's own lens other positions; raises LensError if its rows do not fit them."""
     if not positions:
-        return moved
-    assert isinstance(moved.lens, Lens)
+        return project
+    assert isinstance(project.lens, Lens), "rows are changed of a lens of the project"
     try:
-        return moved.replace(lens=moved.lens.replace(positions=positions))
+        return project.replace(lens=project.lens.replace(positions=positions))
     except ValueError as error:
         raise LensError(sentence(error)) from None
+
+
+def _with_gaps(position: Position, gaps: dict[int, float]) -> Position:
+    return position.replace(gaps=tuple(sorted(gaps.items())))
 
 
 def _room_behind_stop(rows: list[Row], target: int) -> float:
@@ -281,7 +293,7 @@ def _with_stop_at(position: Position, lens: Lens, target: int, behind: float) ->
                 f"the stop cannot go there: in zoom position {position.name!r} that gap is {-gaps[target - 1]:.2f} mm "
                 "too narrow; choose a row beside another gap of air"
             )
-    return position.replace(gaps=tuple((k + (k >= target), gap) for k, gap in sorted(gaps.items())))
+    return _with_gaps(position, {k + (k >= target): gap for k, gap in gaps.items()})
 
 
 def _behind(first: int) -> Callable[[int], int]:

@@ -108,14 +108,16 @@ const expose = (stops) => app.setView(app.state.plate?.lit ? { plate_stops: stop
 const autoExpose = () => (app.state.plate?.lit ? app.setView({ plate_stops: 0 }) : app.ask('api/expose'));
 
 // All changes of the project go through one queue, so that the last change wins, and save, undo and search use what
-// the page shows.
+// the page shows. Values that keep a part of the state (an angle, a side) are a function: it runs when their turn comes,
+// because an earlier change may still be on its way.
 const line = inLine();
 app.line = line;
 app.command = async (name, values, group = '', table = null, stroke = '') => {
   const about = `command ${name}`;
   try {
     await line(async () => {
-      const state = await post('api/do', { name, values, group, table: typeof table === 'function' ? table() : table });
+      const given = typeof values === 'function' ? values() : values;
+      const state = await post('api/do', { name, values: given, group, table: typeof table === 'function' ? table() : table });
       hush(about);
       take(state);
       if (state.became) toast(sentence(state.became), 'info', 9000, about);

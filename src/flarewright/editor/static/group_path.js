@@ -1,5 +1,8 @@
 // The timeline of a light's path.
-import { button, h, number, toast } from './ui.js';
+import { button, h, number as parsed, toast } from './ui.js';
+
+// keys lie at hundredths of a second
+const HALF_STEP_S = 0.0051;
 
 export function pathGroup(app) {
   const { player } = app;
@@ -19,7 +22,7 @@ export function pathGroup(app) {
   bar.addEventListener('input', () => player.scrub(Number(bar.value)));
   bar.addEventListener('change', () => player.rest());
   box.addEventListener('change', () => {
-    const value = number(box.value);
+    const value = parsed(box.value);
     if (value === null) toast(`Time: “${box.value}” is no number, so it stays ${player.at.toFixed(2)} s.`, 'error', 9000, 'path time');
     else if (value < 0) toast(`${value} s became 0 s: a path starts there.`, 'info', 9000, 'path time');
     if (value === null) box.value = player.at.toFixed(2); else player.go(value);
@@ -53,7 +56,7 @@ export function pathGroup(app) {
       const field = h('input', { type: 'text', value: kept, 'aria-label': `${name} of key ${k + 1}`, name: `key_${name}_${k}` });
       const back = () => { drawn = ''; field.value = kept; field.defaultValue = kept; };
       field.addEventListener('change', () => {
-        const found = number(field.value);
+        const found = parsed(field.value);
         field.defaultValue = field.value;
         if (found !== null) { set(found).catch(back); return; }
         toast(`“${field.value}” is no number, so it stays ${kept}.`, 'error', 9000, `key ${name}`);
@@ -62,11 +65,21 @@ export function pathGroup(app) {
       field.addEventListener('keydown', (event) => { if (event.key === 'Enter') field.blur(); if (event.key === 'Escape') { back(); field.blur(); event.stopPropagation(); } });
       return h('td', {}, field);
     };
-    const [x, y] = each.field_deg;
-    const place = (field_deg) => app.command('set_key', { light: app.light, at_s: each.at_s, field_deg });
-    return h('tr', {}, cell(each.at_s, 'seconds', (at_s) => app.command('move_key', { light: app.light, number: k, at_s })),
-      cell(x, 'right', (value) => place([value, y])), cell(y, 'up', (value) => place([x, value])),
-      h('td', {}, button('×', () => app.command('remove_key', { light: app.light, number: k }).catch(() => {}), { kind: 'quiet', 'aria-label': `Remove key ${k + 1}` })));
+    // the times the key has or was asked to have: an answer may be on its way, and a refused move leaves it in place
+    const { light } = app;
+    const times = [each.at_s];
+    const number = () => {
+      const now = app.state.lights[light].keys;
+      return times.map((at_s) => now.findIndex((key) => Math.abs(key.at_s - at_s) < HALF_STEP_S)).find((one) => one >= 0) ?? k;
+    };
+    const move = (at_s) => app.command('move_key', () => { const values = { light, number: number(), at_s }; times.push(at_s); return values; });
+    const place = (axis, angle) => app.command('set_key', () => {
+      const key = app.state.lights[light].keys[number()];
+      return { light, at_s: key.at_s, field_deg: key.field_deg.with(axis, angle) };
+    });
+    return h('tr', {}, cell(each.at_s, 'seconds', move),
+      cell(each.field_deg[0], 'right', (value) => place(0, value)), cell(each.field_deg[1], 'up', (value) => place(1, value)),
+      h('td', {}, button('×', () => app.command('remove_key', () => ({ light, number: number() })).catch(() => {}), { kind: 'quiet', 'aria-label': `Remove key ${k + 1}` })));
   }
   function tick() {
     play.textContent = player.playing ? '■ Stop' : '▶ Play';

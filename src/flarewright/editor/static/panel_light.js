@@ -22,8 +22,11 @@ const fitted = (key, size) => cropped(pair(key), size).map((mm) => Number(mm.toF
 export function lightPanel(app) {
   const one = (state) => state.lights[app.light];
   const set = (values, held = '') => app.lively('set_light', { light: app.light, values }, held);
-  const across = entry({ label: 'Right', tip: 'Field angle: the direct image lies focal length × tan(angle) to the right of the middle.', unit: '°', name: 'light_x', digits: 3, needed: 'needs an angle', get: (s) => one(s).field_deg[0], set: (x) => app.command('move_light', { light: app.light, x, y: one(app.state).field_deg[1] }).catch(() => {}) });
-  const up = entry({ label: 'Up', tip: 'Field angle upwards. A light outside the frame has no direct image, but its ghosts may reach the frame.', unit: '°', name: 'light_y', digits: 3, needed: 'needs an angle', get: (s) => one(s).field_deg[1], set: (y) => app.command('move_light', { light: app.light, x: one(app.state).field_deg[0], y }).catch(() => {}) });
+  // changes of one of several numbers that a command takes together
+  const move = (axis, angle) => { const { light } = app; app.command('move_light', () => { const [x, y] = app.state.lights[light].field_deg.with(axis, angle); return { light, x, y }; }).catch(() => {}); };
+  const reshape = (change) => { const { light } = app; app.lively('set_light', () => { const shape = structuredClone(app.state.lights[light].shape); change(shape); return { light, values: { shape } }; }, ''); };
+  const across = entry({ label: 'Right', tip: 'Field angle: the direct image lies focal length × tan(angle) to the right of the middle.', unit: '°', name: 'light_x', digits: 3, needed: 'needs an angle', get: (s) => one(s).field_deg[0], set: (x) => move(0, x) });
+  const up = entry({ label: 'Up', tip: 'Field angle upwards. A light outside the frame has no direct image, but its ghosts may reach the frame.', unit: '°', name: 'light_y', digits: 3, needed: 'needs an angle', get: (s) => one(s).field_deg[1], set: (y) => move(1, y) });
   const choose = h('div', { class: 'buttons lamps' });
   const plainIntensity = slider({ label: 'Intensity', tip: 'Irradiance of the light on a plane facing it; all its ghosts scale with it.', min: 0, max: 10, step: 0.01, curve: 2, name: 'intensity', get: (s) => one(s).intensity, set: (intensity, held) => set({ intensity }, held) });
   // lights of a plate have its unit, in which a lamp may be a million times fainter than the sun
@@ -38,7 +41,7 @@ export function lightPanel(app) {
   });
   const spectra = (s) => (rgbOf(s) && !SPECTRA.some(([key]) => key === one(s).spectrum) ? [...SPECTRA, [one(s).spectrum, 'Colour below']] : SPECTRA);
   const sides = (s) => (one(s).shape?.kind === 'rectangle' ? one(s).shape : null);
-  const side = (label, k, tip) => ofLens(entry({ label, tip, unit: '°', name: `light_${label.toLowerCase()}`, needed: 'needs an angle', get: (s) => (k < 2 ? sides(s)?.size_deg[k] : sides(s)?.rotation_deg), set: (value) => { const shape = structuredClone(sides(app.state)); if (k < 2) shape.size_deg[k] = value; else shape.rotation_deg = value; set({ shape }); } }));
+  const side = (label, k, tip) => ofLens(entry({ label, tip, unit: '°', name: `light_${label.toLowerCase()}`, needed: 'needs an angle', get: (s) => (k < 2 ? sides(s)?.size_deg[k] : sides(s)?.rotation_deg), set: (value) => reshape((shape) => { if (k < 2) shape.size_deg[k] = value; else shape.rotation_deg = value; }) }));
   const rectangle = [side('Width', 0, 'Angular width of the rectangle.'), side('Height', 1, 'Angular height of the rectangle.'), side('Turned', 2, 'Rotation of the rectangle, counter-clockwise.')];
   const disc = ofLens(slider({ label: 'Disc', tip: 'Angular diameter of the light: 0 is a point, 0.53° the sun. A wide light blurs every ghost.', min: 0, max: 10, step: 0.01, curve: 2, unit: '°', get: (s) => one(s).diameter_deg, set: (diameter_deg, held) => set({ diameter_deg }, held) }));
   const formed = ofLens(choice({ label: 'Shape', name: 'light_shape', tip: 'A rectangle serves for windows, signs and tubes.', options: (s) => [['disc', 'point or disc'], ['rectangle', 'rectangle'], ...(one(s).shape?.kind === 'polygon' ? [['polygon', 'polygon']] : [])], get: (s) => one(s).shape?.kind ?? 'disc', set: (kind) => { const wide = one(app.state).diameter_deg || 1; if (kind === 'rectangle') set({ shape: { kind, size_deg: [wide, wide] }, diameter_deg: 0 }); else if (kind === 'disc') set({ shape: null, diameter_deg: sides(app.state)?.size_deg[1] ?? 0 }); } }));

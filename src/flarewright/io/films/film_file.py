@@ -140,13 +140,13 @@ def _film(path: str, _: tuple[int, int]) -> Film:
         # AVI has no times of frames that are shown in another order than they are stored
         unordered = container.format.name == "avi" and stream.codec_context.has_b_frames
         by_decoding = interlaced or unordered or stream.codec_context.name in _BY_DECODING
-    times, keys, digest, packets, trimmed = _packets(path)
-    if by_decoding or len(np.unique(times)) < packets:
+    packets = _packets(path)
+    if by_decoding or len(np.unique(packets.times)) < packets.shown:
         times, keys, frames = _decoded_times(path)
     else:
-        times, frames = np.sort(times), packets
+        times, keys, frames = np.sort(packets.times), packets.keys, packets.shown
     # a trimmed film stores frames that it does not show, and counts them
-    _check_count(path, frames, packets, 0 if trimmed else stated)
+    _check_count(path, frames, packets.shown, 0 if packets.trimmed else stated)
     fps, uneven = _rate(times, base, rate, frames)
     _check_length(path, frames, fps, long_s)
     if interlaced:
@@ -156,12 +156,24 @@ def _film(path: str, _: tuple[int, int]) -> Film:
     facts = repr((coding, rotation, aspect, (width, height))).encode()
     return Film(
         path, (width, height), frames, fps, aspect if aspect > 0.0 else 1.0, coding, rotation, code,
-        known, sha256(digest + facts).hexdigest(), times, keys, (*remarks, *turned, *uneven),
+        known, sha256(packets.digest + facts).hexdigest(), times, keys, (*remarks, *turned, *uneven),
     )  # fmt: skip
 
 
-def _packets(path: str) -> tuple[NDArray[np.int64], NDArray[np.int64], bytes, int, bool]:
-    """Return the times of shown packets and of key frames, a digest of all, the shown ones' number, if others exist."""
+@dataclass(frozen=True)
+class _Packets:
+    """The packets of a film: the times of the shown ones and of key frames, and a digest of all."""
+
+    times: NDArray[np.int64]
+    keys: NDArray[np.int64]
+    digest: bytes
+    # the number of those that are shown, and whether there are others
+    shown: int
+    trimmed: bool
+
+
+def _packets(path: str) -> _Packets:
+    """Read all packets, without decoding them."""
     digest = sha256()
     times: list[int] = []
     keys: list[int] = []
@@ -181,7 +193,7 @@ def _packets(path: str) -> tuple[NDArray[np.int64], NDArray[np.int64], bytes, in
                 times.append(packet.pts)
                 if packet.is_keyframe:
                     keys.append(packet.pts)
-    return np.array(times, np.int64), np.array(sorted(keys), np.int64), digest.digest(), number, trimmed
+    return _Packets(np.array(times, np.int64), np.array(sorted(keys), np.int64), digest.digest(), number, trimmed)
 
 
 def _decoded_times(path: str) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:

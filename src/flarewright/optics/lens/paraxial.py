@@ -64,6 +64,14 @@ class FirstOrder:
     bfl_x: float | None = None
 
 
+def focal_lengths(efl: float, efl_x: float | None) -> tuple[float, float]:
+    """Return the focal lengths across and up the picture, mm, of a `FirstOrder`.
+
+    A plane without power has no focus: the lens then counts as equal in both.
+    """
+    return efl if efl_x is None or not np.isfinite(efl_x) else efl_x, efl
+
+
 def vertex_positions(lens: Lens) -> Floats:
     """Return the z of every row's vertex, mm from the first, shape (K,)."""
     return np.concatenate([[0.0], np.cumsum([row.thickness for row in lens.rows[:-1]])])

@@ -12,6 +12,7 @@ from ...errors import ProjectError
 from ...io.images.plate_image import read_depth, read_matte
 from ...model import Lens, Light, Project
 from ...model.project.holdout import Holdout
+from ...optics.lens.paraxial import focal_lengths
 from ...optics.lens.paths import direct_path
 from ...optics.pupil.occlusion import hidden_part, visible_shape
 from ...optics.pupil.polygon import backward, centroid, content, mapped, solid_angle
@@ -105,7 +106,7 @@ def _to_plate(lens: Lens, shot: Shot, holdout: Holdout, shape: tuple[int, ...]) 
     """Return the map from slopes, relative to the shot's own, to columns and rows of a plate: matrix and offset."""
     direct, here = direct_path(lens), np.tan(np.radians(shot.light.field_deg))
     order = shot.packed.first_order
-    ideal = np.array([order.efl if order.efl_x is None else order.efl_x, order.efl])
+    ideal = np.array(focal_lengths(order.efl, order.efl_x))
     centre = traced_centre(shot, direct, here)
     moves = None if shot.border is None or centre is None else motion(shot, direct)
     place = ideal * here if centre is None else centre[0]

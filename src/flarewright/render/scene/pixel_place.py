@@ -10,6 +10,7 @@ import numpy as np
 from ...errors import ProjectError
 from ...io.images.mask_image import read_mask
 from ...model import Lens, Light
+from ...optics.lens.paraxial import focal_lengths
 from ...typing import Floats
 from .direct_image import direct_place
 from .opening import make_opening
@@ -68,9 +69,8 @@ def direct_images(settled: ResolvedProject, light: Light) -> DirectImages:
     project = settled.project.replace(lights=(point,), holdout=None, curves=())
     mask = None if settled.iris.mask is None else read_mask(settled.iris.mask)
     alone = replace(settled, project=project)
-    order = settled.order
-    across = order.efl if order.efl_x is None else order.efl_x
-    return DirectImages(settled.lens, make_shots(alone, make_opening(alone, mask))[0], (across, order.efl))
+    efl = focal_lengths(settled.order.efl, settled.order.efl_x)
+    return DirectImages(settled.lens, make_shots(alone, make_opening(alone, mask))[0], efl)
 
 
 def image_px(images: DirectImages, field_deg: tuple[float, float]) -> tuple[float, float] | None:

@@ -417,14 +417,21 @@ def distance_in_front(settled: ResolvedProject, packed: PackedLens, number: int)
         When the light stands in the lens, in its filter, or behind its entrance pupil.
     """
     distance = settled.light_distance(number)
-    least = least_distance(packed)
-    if distance is not None and distance <= least:
-        ahead = filter_length(settled.project.filter)
-        raise ProjectError(
-            f"lights[{number}].distance: a light at {distance + ahead:g} mm stands in the lens {settled.lens.name} or "
-            f"behind its entrance pupil; give more than {least + ahead:.4g} mm"
-        )
+    check_in_front(packed, distance, settled.lens.name, filter_length(settled.project.filter), f"lights[{number}].")
     return distance
+
+
+def check_in_front(packed: PackedLens, distance: float | None, lens: str, ahead: float, where: str = "") -> None:
+    """Raise an error for a light within a lens, at a distance from its first row or None; `ahead` of it is a filter.
+
+    The message states distances from the lens, as they are given.
+    """
+    least = least_distance(packed)
+    if distance is not None and not distance > least:
+        raise ProjectError(
+            f"{where}distance: a light at {distance + ahead:g} mm stands in the lens {lens} or behind its entrance "
+            f"pupil; give more than {least + ahead:.4g} mm"
+        )
 
 
 def resolve_project(project: Project) -> ResolvedProject:

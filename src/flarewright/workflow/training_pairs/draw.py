@@ -23,8 +23,8 @@ from ...model.project.distribution import (
     TextChoice,
     Uniform,
 )
+from ...optics.lens.paraxial import focal_lengths
 from ...render.scene.resolve import open_lens, resolve_project
-from .masks import focal_lengths
 
 # draft colours need three wavelengths, final ones seven
 _WAVELENGTHS = {"draft": 3, "final": 7}

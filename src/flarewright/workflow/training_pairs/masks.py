@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite, sqrt
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -66,11 +66,6 @@ class LightImage:
         if self.radius_px < _SMALL_PX:
             cover *= np.pi * self.radius_px**2 * self.stretch / cover.sum()
         return (spans[1], spans[0]), cover[rows, columns].astype(np.float32)
-
-
-def focal_lengths(efl: float, efl_x: float | None) -> tuple[float, float]:
-    """Return the focal lengths across and down the picture, mm; that across is None or infinite if it has no own."""
-    return efl if efl_x is None or not isfinite(efl_x) else efl_x, efl
 
 
 def light_image(

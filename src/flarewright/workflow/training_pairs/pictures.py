@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from ...io.project.project_text import project_text
 from ...model import Layer, Project
 from ...model.project.dataset import DatasetSpec
+from ...optics.lens.paraxial import focal_lengths
 from ...render.image.compose import beauty
 from ...render.render import Rendering
 from ...render.render import render as render_project
 from ...typing import Pixels
 from .background import background_of, mean_luminance
 from .draw import Drawn, brightened, draw_item, splits_of
-from .masks import LightImage, focal_lengths, ghost_mask, light_image, light_mask
+from .masks import LightImage, ghost_mask, light_image, light_mask
 from .sensor import Sensor, draw_sensor, exposed, noise_of
 
 # exposure of = "mean": value of the background's mean luminance, white at 1 (a grey card)
