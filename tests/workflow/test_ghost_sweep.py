@@ -6,6 +6,7 @@ import csv
 import io
 import json
 
+import numpy as np
 import pytest
 from singlet_file import singlet_file
 
@@ -14,6 +15,7 @@ from flarewright.cli.render.ghost_sweep import sweep_axes
 from flarewright.errors import FlarewrightError
 from flarewright.io.lens.coating_text import coating_choice
 from flarewright.model import Project
+from flarewright.optics.lens.field_angles import field_angles
 from flarewright.optics.rays import ghost_table
 from flarewright.optics.rays.ghost_table import GhostQuery
 from flarewright.render.analysis import ghosts
@@ -69,8 +71,12 @@ def test_a_film_without_reflection_removes_the_part_that_the_ranking_states(tmp_
 
 
 def test_fields_lie_in_the_direction_of_the_light():
-    assert along((3.0, 4.0), (0.0, 10.0)) == ((0.0, 0.0), pytest.approx((6.0, 8.0)))
+    """A field of 60 degrees on the diagonal was one of 53: field angles do not add as the sides of a right angle do."""
     assert along((0.0, 0.0), (5.0,)) == ((5.0, 0.0),)
+    assert along((0.0, -3.0), (0.0, 5.0)) == ((0.0, 0.0), (0.0, -5.0))
+    towards = np.degrees(np.arctan2(np.tan(np.radians(-20.0)), np.tan(np.radians(30.0))))
+    for angle, found in zip((0.5, 10.0, 60.0, 89.0), along((30.0, -20.0), (0.5, 10.0, 60.0, 89.0)), strict=True):
+        assert found == pytest.approx(field_angles(angle, towards), rel=1e-12)
 
 
 def test_axes():

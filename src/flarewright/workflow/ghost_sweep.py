@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, product
-from math import hypot
+from math import atan, degrees, hypot, radians, tan
 
 from ..model import Project
 from ..optics.lens.plane_plates import filter_length
@@ -66,10 +66,19 @@ class SurfaceGain:
 
 def along(light_deg: tuple[float, float], angles_deg: Sequence[float]) -> tuple[tuple[float, float], ...]:
     """Return field angles at distances from the axis in the direction of a light, to the right for one on the axis."""
-    x, y = light_deg
+    # directions are a straight line in the picture in their tangents, not in field angles
+    x, y = (tan(radians(angle)) for angle in light_deg)
     length = hypot(x, y)
-    unit = (1.0, 0.0) if length == 0.0 else (x / length, y / length)
-    return tuple((angle * unit[0], angle * unit[1]) for angle in angles_deg)
+    right, up = (1.0, 0.0) if length == 0.0 else (x / length, y / length)
+    return tuple((_part(angle, right), _part(angle, up)) for angle in angles_deg)
+
+
+def _part(angle_deg: float, part: float) -> float:
+    """Return the field angle along an axis of the picture, whose tangent is a part of that of the whole angle."""
+    # along an axis without rounding
+    if part in (-1.0, 0.0, 1.0):
+        return angle_deg * part
+    return degrees(atan(tan(radians(angle_deg)) * part))
 
 
 def sweep_ghosts(
