@@ -73,7 +73,8 @@ def identify(
     Notes
     -----
     Rank of the Jacobian by its singular values, with every column in the variable's own unit: fraction of a length, of
-    the mean curvature, of n - 1. The result is local: another lens far away may have the same ghosts.
+    the mean curvature, of n - 1; of the mean length for a gap of 0. The result is local: another lens far away may have
+    the same ghosts.
     """
     names, columns, unit = _variables(structure, vector, stop_known)
     found = differentiate(structure, vector, entrance)
@@ -111,10 +112,12 @@ def _variables(structure: Structure, vector: Floats, stop_known: bool) -> tuple[
     """Return names, columns and units of the variables."""
     rows, stop = structure.rows, structure.stop
     curvature = float(np.abs(vector[1 + rows : 1 + 2 * rows]).mean()) or 1.0
+    # where surfaces touch or the stop stands on one, a fraction of the gap is no change
+    length = float(np.abs(vector[1 : 1 + rows]).mean())
     entries = [] if stop_known else [("stop diameter", 0, vector[0])]
     for k in range(rows):
         label = "sensor distance" if k == rows - 1 else f"thickness behind row {k}"
-        entries.append((label, 1 + k, vector[1 + k]))
+        entries.append((label, 1 + k, vector[1 + k] or length))
     entries += [(f"curvature of row {k}", 1 + rows + k, curvature) for k in range(rows) if k != stop]
     entries += [
         (f"index behind row {k}", 1 + 2 * rows + k, vector[1 + 2 * rows + k] - 1.0)
