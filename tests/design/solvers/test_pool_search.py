@@ -259,6 +259,13 @@ def test_impossible_targets_differ_from_unsolved_ones(design, words):
         solve(problem_of(project(**design))[0], time_limit=0.1)
 
 
+def test_a_near_light_is_refused():
+    """Its distance was ignored: the targets were the ghosts of a distant light, of which one was a third too large."""
+    near = project().replace(lights=(Light(field_deg=(6.0, 3.0)), Light(field_deg=(6.0, 3.0), distance=300.0)))
+    with pytest.raises(ProjectError, match=r"lights\[1\].distance: design places the ghosts of distant lights only"):
+        problem_of(near)
+
+
 def test_a_damaged_search_is_no_traceback(tmp_path):
     path = tmp_path / "search.json"
     for text in ("", "{", "[]", '{"version": 9}', '{"version": 1, "seed": 0}'):

@@ -38,8 +38,15 @@ def problem_of(project: Project) -> tuple[Problem, ResolvedProject]:
     Raises
     ------
     FlarewrightError
-        When design cannot use the project's lens, a target names no ghost of it, or no lens has enough ghosts.
+        When design cannot use the project's lens, a target names no ghost of it, no lens has enough ghosts, or a light
+        is near.
     """
+    for number, light in enumerate(project.lights):
+        # its ghosts have another place and another size than those of a distant light in the same direction
+        if light.distance is not None:
+            raise ProjectError(
+                f"lights[{number}].distance: design places the ghosts of distant lights only; remove the distance"
+            )
     design = project.design or Design()
     design = design.replace(
         ghost_targets=tuple(
