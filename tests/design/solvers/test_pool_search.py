@@ -21,9 +21,9 @@ from flarewright.errors import FlarewrightError, ProjectError
 from flarewright.kernels.design.arguments import Effort, FreeVariables, GhostAims, LensStructure
 from flarewright.kernels.design.ghosts import RADIUS, REACH, REACH_THESIS
 from flarewright.kernels.design.local_search import polish_many
-from flarewright.model import Design, GhostTarget, Light, Project
+from flarewright.model import Design, GhostTarget, Light, Project, QuarterWave
 from flarewright.model.project.design import Bounds
-from flarewright.render.scene.resolve import complete_lens
+from flarewright.render.scene.resolve import complete_lens, load_lens
 
 
 # unknown signs take long: then only one structure beside the planted one is searched
@@ -240,6 +240,23 @@ def test_fixed_rows_stay():
         assert vector[1 + row] == surface.thickness
         assert vector[1 + 9 + row] == surface.curvature
         assert vector[1 + 18 + row] == surface.medium.n_d
+
+
+def test_fixed_rows_keep_their_asphere_and_their_coating():
+    """They came back as bare spheres, so the written lens had other ghosts than the rows that were to stay."""
+    lens = load_lens("heliar-tronnier")
+    own = lens.rows[6].replace(conic=-0.5, asphere=(1e-6,), coating=QuarterWave(center_wavelength_nm=550.0))
+    lens = lens.replace(rows=(*lens.rows[:6], own, *lens.rows[7:]))
+    given = project(structure="lens", fixed_rows=(6,)).replace(lens=lens)
+    problem, settled = problem_of(given)
+    found = outcomes(solve(problem, time_limit=None, most_searches=40), problem, count=1)[0].lens.rows[6]
+    mine = settled.lens.rows[6]
+    assert found == mine.replace(semi_diameter=found.semi_diameter)
+    assert found.semi_diameter <= mine.semi_diameter
+    # rays of the final quality would trace a sphere
+    assert given.design is not None
+    with pytest.raises(ProjectError, match="has 6, which is no centred sphere"):
+        problem_of(given.replace(design=given.design.replace(quality="final")))
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,7 @@ class Outcome:
 
 def lens_of(
     structure: Structure, vector: Floats, radii: Floats, *, name: str, iris: Iris | None = None,
-    media: Mapping[int, Medium | None] | None = None,
+    media: Mapping[int, Medium | None] | None = None, kept: Mapping[int, Surface] | None = None,
 ) -> Lens:  # fmt: skip
     """Convert a prescription's vector to a lens.
 
@@ -98,6 +98,8 @@ def lens_of(
     iris : Iris, optional
     media : mapping of int to Medium or None, optional
         Media behind some rows, where known.
+    kept : mapping of int to Surface, optional
+        Rows whose shape and coating stay, and whose rim stays inside their own where they are no spheres.
 
     Returns
     -------
@@ -123,8 +125,16 @@ def lens_of(
             medium = media[k]
         else:
             medium = Medium(n_d=n_d, v_d=round(nearest(n_d)[0].v_d, 2)) if structure.glass[k] else None
-        curvature = float(vector[1 + count + k])
-        rows.append(Surface(curvature=curvature, thickness=thickness, medium=medium, semi_diameter=float(radii[k])))
+        own, semi_diameter = (kept or {}).get(k), float(radii[k])
+        if own is not None and own.semi_diameter is not None and (own.conic or own.terms):
+            # beyond their rim terms may turn the surface back
+            semi_diameter = min(semi_diameter, own.semi_diameter)
+        rows.append(
+            (own or Surface()).replace(
+                curvature=float(vector[1 + count + k]), thickness=thickness, medium=medium,
+                semi_diameter=semi_diameter, semi_diameter_estimated=False,
+            )
+        )  # fmt: skip
     rough = Lens(
         name=name, source="designed by Flarewright for its ghosts", f_number=1.0,
         sensor_distance=float(vector[count]), iris=iris or Iris(), rows=tuple(rows),
@@ -244,7 +254,9 @@ def _same(one: LensCandidate, other: LensCandidate) -> bool:
 
 def _outcome(one: LensCandidate, problem: Problem, name: str, iris: Iris | None, over: Over) -> Outcome | None:
     aim, known = problem.objective, problem.variables(one.structure)
-    media: dict[int, Medium | None] = {row: problem.fixed_media[row] for row in problem.fixed_rows}
+    fixed = {row: problem.own_rows[row] for row in problem.fixed_rows}
+    kept = {row: surface for row, surface in fixed.items() if isinstance(surface, Surface)}
+    media: dict[int, Medium | None] = {row: surface.medium for row, surface in kept.items()}
     names: dict[int, str] = {}
     any_index = None
     inside = keeps_limits(problem, one)
@@ -269,7 +281,7 @@ def _outcome(one: LensCandidate, problem: Problem, name: str, iris: Iris | None,
         lost = tuple(name for name, gone in zip(aim.names, done.after.lost, strict=True) if gone)
     try:
         radii = clear_radii(one.structure, vector, aim.slopes, aim.entrance, edge=problem.bounds.edge)
-        lens = lens_of(one.structure, vector, radii, name=name, iris=iris, media=media)
+        lens = lens_of(one.structure, vector, radii, name=name, iris=iris, media=media, kept=kept)
     except FlarewrightError:
         return None
     return Outcome(

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ...errors import ProjectError
-from ...model import Medium
+from ...model import Stop, Surface
 from ...model.project.design import Bounds
 from ...typing import Floats
 from .glass_list import GlassList
@@ -44,8 +44,8 @@ class Problem:
         Prescriptions that join the first run.
     glasses : GlassList or None
         Glasses that a lens may use; the bounds of n_d follow from them.
-    fixed_media : tuple of Medium or None
-        Medium behind each row of that prescription.
+    own_rows : tuple of Surface or Stop
+        Rows of that prescription; the fixed ones keep their glass, shape and coating.
     traced : bool
         Finish the found lenses with traced rays.
     """
@@ -58,7 +58,7 @@ class Problem:
     fixed_rows: tuple[int, ...] = ()
     begin_with: tuple[tuple[Structure, Floats], ...] = ()
     glasses: GlassList | None = None
-    fixed_media: tuple[Medium | None, ...] = ()
+    own_rows: tuple[Surface | Stop, ...] = ()
     traced: bool = False
 
     def check(self) -> None:

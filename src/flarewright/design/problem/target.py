@@ -8,7 +8,7 @@ from math import hypot, radians, tan
 import numpy as np
 
 from ...errors import ProjectError
-from ...model import Project, Stop
+from ...model import Lens, Project, Surface
 from ...model.project.design import Design, GhostTarget
 from ...render.scene.resolve import ResolvedProject, resolve_project
 from ...typing import Floats
@@ -77,9 +77,9 @@ def problem_of(project: Project) -> tuple[Problem, ResolvedProject]:
     return Problem(
         objective, found, bounds,
         stop_diameter=float(vector[0]) if design.brightness == "stop" else None,
-        fixed=vector if design.fixed_rows else None, fixed_rows=_checked(design.fixed_rows, structure),
+        fixed=vector if design.fixed_rows else None, fixed_rows=_checked(design, structure, settled.lens),
         begin_with=((structure, vector),) if changed and structure in found else (), glasses=glasses,
-        fixed_media=tuple(None if isinstance(row, Stop) else row.medium for row in settled.lens.rows),
+        own_rows=settled.lens.rows,
         traced=design.quality == "final",
     ), settled  # fmt: skip
 
@@ -124,11 +124,21 @@ def _enough(surfaces: int, wanted: int) -> int:
     return next(count for count in range(surfaces, 1000) if structures(count, wanted, most=1))
 
 
-def _checked(rows: tuple[int, ...], structure: Structure) -> tuple[int, ...]:
-    for row in rows:
+def _checked(design: Design, structure: Structure, lens: Lens) -> tuple[int, ...]:
+    for row in design.fixed_rows:
         if not 0 <= row < structure.rows:
             raise ProjectError(f"design.fixed_rows has {row}, but the lens' rows are 0 to {structure.rows - 1}")
-    return rows
+        surface = lens.rows[row]
+        if design.quality == "final" and isinstance(surface, Surface) and not _is_centred_sphere(surface):
+            raise ProjectError(
+                f"design.fixed_rows has {row}, which is no centred sphere, and the rays of design.quality "
+                f'"final" meet spheres only; choose "draft", or free row {row}'
+            )
+    return design.fixed_rows
+
+
+def _is_centred_sphere(surface: Surface) -> bool:
+    return not (surface.conic or surface.terms or surface.displaced or surface.figure)
 
 
 def _with_ghost_targets(own: Objective, design: Design, structure: Structure) -> Objective:
