@@ -14,7 +14,7 @@ from ...io.files.atomic_write import write_bytes_atomically, write_text_atomical
 from ...io.images.html_page import html_page
 from ...io.lens.lens_writer import write_lens
 from ...io.project.project_text import project_text
-from ...model import AsLens, Output, Project, Quality
+from ...model import AsLens, Lens, Output, PerRow, Preset, Project, Quality
 from ...model.project.design import Design, GhostTarget
 from ...typing import Floats
 from ..finishing.candidate import Outcome
@@ -193,7 +193,20 @@ def _color_project(project: Project, problem: Problem, one: Outcome, path: Path)
     if not found or project.design is None:
         return None
     design = Design(ghost_targets=tuple(found.values()), bounds=project.design.bounds)
-    return project.replace(lens=os.fspath(path), design=design, coating=AsLens(), f_number=None, zoom=None)
+    return _with_lens(project, os.fspath(path)).replace(design=design, coating=AsLens())
+
+
+def _with_lens(project: Project, lens: Lens | str) -> Project:
+    """Return a project with a found lens, without what holds for the rows and gaps of its own lens only.
+
+    The found lens has its own stop, focus and sensor, and stands for the whole of lens, filter and cover glass.
+    """
+    camera = project.camera.replace(sensor_distance=None, focus_distance=None, cover_glass=None)
+    by_row = isinstance(project.coating, Preset | PerRow)
+    return project.replace(
+        lens=lens, camera=camera, f_number=None, zoom=None, filter=None,
+        coating=AsLens() if by_row else project.coating,
+    )  # fmt: skip
 
 
 def target_pictures(problem: Problem, project: Project) -> list[Floats]:
@@ -228,12 +241,13 @@ def _draft(path: Path, outcome: Outcome, project: Project, remarks: list[str]) -
     from ...render.image.display import view
     from ...render.render import render
 
+    project = _with_lens(project, outcome.lens)
     width, height = project.camera.size_px
     small = 480.0 / max(width, height, 480)
     camera = project.camera.replace(size_px=(max(1, round(width * small)), max(1, round(height * small))))
     shot = project.replace(
-        lens=outcome.lens, camera=camera, quality=Quality(mode="draft", wavelengths=3, paths="same-side"),
-        output=Output(layers="beauty", starburst=False), f_number=None, iris=project.iris, design=None,
+        camera=camera, quality=Quality(mode="draft", wavelengths=3, paths="same-side"),
+        output=Output(layers="beauty", starburst=False), design=None,
     )  # fmt: skip
     try:
         rendering = render(shot)
