@@ -167,6 +167,22 @@ def test_a_round_iris_turns_with_the_light_blades_by_steps_and_an_anamorphic_len
     assert lens_flare(squeezed).turns_by_deg is None
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"lights": ({"field_deg": (0.0, 0.0), "shape": {"kind": "rectangle", "size_deg": (30.0, 1.0)}},)},
+        {"camera": {"size_px": (48, 32), "sensor_reflectance": 0.1, "sensor_grating": {"period_um": 4.0}}},
+        {"art": {"rules": ({"select": "all", "offset_mm": (3.0, 0.0)},)}},
+    ],
+)
+def test_what_stands_in_the_picture_does_not_turn_with_the_light(changes):
+    """One picture served all rolls, so a bar of light, the sensor's grating and moved ghosts turned with the light."""
+    given = heliar("triplet-pestrecov", iris={}, quality={"mode": "draft"}).model_dump() | changes
+    assert lens_flare(Project.model_validate(given)).turns_by_deg is None
+    unmoved = {**given, "art": {"physical": True, **changes.get("art", {})}}
+    assert lens_flare(Project.model_validate(unmoved)).turns_by_deg == (0.0 if "art" in changes else None)
+
+
 def test_five_blades_are_drawn_at_four_rolls_and_turned_to_all_others():
     table = FlareTable(painted(turns_by_deg=72.0), FRAME)
     drawn = {view[0] for roll in np.linspace(-180.0, 180.0, 501) for view in table.views(float(roll))}

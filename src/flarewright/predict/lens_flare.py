@@ -169,8 +169,16 @@ def _square(project: Project, frame: Frame) -> Camera:
 def _turns_by(settled: ResolvedProject) -> float | None:
     """Return the roll that only rotates the flare, as `Flare.turns_by_deg`."""
     iris, dirt = settled.iris, settled.project.dirt
-    if iris.mask is not None or (dirt.in_ghosts and dirt != Dirt()):
+    if iris.mask is not None or (dirt.in_ghosts and dirt != Dirt()) or _stands_in_picture(settled.project):
         return None
     if not all(shot.packed.symmetric for shot in make_shots(settled, make_opening(settled, None))):
         return None
     return 0.0 if iris.blades == 0 or iris.rounding == 1.0 else 360.0 / iris.blades
+
+
+def _stands_in_picture(project: Project) -> bool:
+    """Return whether something else than the iris keeps its direction in the picture while the light goes round it."""
+    light, camera, art = project.lights[0], project.camera, project.art
+    grating = camera.sensor_grating is not None and camera.sensor_reflectance > 0.0
+    moved = not art.physical and any(any(rule.offset_px or rule.offset_mm or ()) for rule in art.rules)
+    return grating or moved or any(one is not None for one in (light.shape, light.holdout, project.holdout))
