@@ -276,6 +276,26 @@ def test_impossible_targets_differ_from_unsolved_ones(design, words):
         solve(problem_of(project(**design))[0], time_limit=0.1)
 
 
+def test_a_target_for_a_ghost_that_is_invisible_at_its_light_is_refused():
+    """It was left out without a word, and the search could call all targets met."""
+    lights = (Light(field_deg=(6.0, 3.0)), Light(field_deg=(45.0, 0.0)))
+    aim = problem_of(project().replace(lights=lights))[0].objective
+    seen = [{name.partition(" ")[0] for name in aim.names if name.endswith(f"light {light}")} for light in (0, 1)]
+    hidden = sorted(seen[0] - seen[1])[0]
+
+    def asked(**target):
+        return problem_of(project(ghost_targets=(GhostTarget(ghost=hidden, **target),)).replace(lights=lights))[0]
+
+    for wish in ({"move_mm": 1.0}, {"height": 2.0}, {"radius_mm": 1.0}):
+        with pytest.raises(ProjectError, match=f"ghost {hidden} is invisible at that light"):
+            asked(light=1, **wish)
+        # at one of the lights it is visible
+        assert f"{hidden} at light 0" in asked(**wish).objective.names
+    # a colour is for design colors, and what is invisible is removed already
+    for wish in ({"color": (1.0, 0.0, 0.0)}, {"action": "remove"}, {"action": "ignore"}):
+        assert asked(light=1, **wish).objective.names == aim.names
+
+
 def test_a_near_light_is_refused():
     """Its distance was ignored: the targets were the ghosts of a distant light, of which one was a third too large."""
     near = project().replace(lights=(Light(field_deg=(6.0, 3.0)), Light(field_deg=(6.0, 3.0), distance=300.0)))

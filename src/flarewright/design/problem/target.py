@@ -145,6 +145,10 @@ def _with_ghost_targets(own: Objective, design: Design, structure: Structure) ->
     """Return the objective made of a lens' own ghosts with ghost targets applied; they may name what does not exist."""
     names = {f"{j}-{i}" for j, i in structure.pairs}
     lights = len(own.slopes)
+    visible = [
+        {name.partition(" ")[0] for name in own.names[own.spans[light] : own.spans[light + 1]]}
+        for light in range(lights)
+    ]
     for number, ghost_target in enumerate(design.ghost_targets):
         where = f"design.ghost_targets[{number}]"
         if ghost_target.ghost is not None and ghost_target.ghost not in names:
@@ -156,6 +160,13 @@ def _with_ghost_targets(own: Objective, design: Design, structure: Structure) ->
             raise ProjectError(f"{where}: there is no light {ghost_target.light}; they count from 0 to {lights - 1}")
         if ghost_target.ghost is not None and not design.own_ghosts:
             raise ProjectError(f"{where} names the lens' own ghost {ghost_target.ghost}, but own_ghosts is false")
+        at = range(lights) if ghost_target.light is None else (ghost_target.light,)
+        if _moves_own(ghost_target) and not any(ghost_target.ghost in visible[light] for light in at):
+            # it has no place and size there from which to go on
+            raise ProjectError(
+                f"{where}: the lens' ghost {ghost_target.ghost} is invisible at that light; give place_mm and "
+                "radius_mm of a new ghost instead, without its name"
+            )
     targets, weights, labels, spans = [], [], [], [0]
     for light in range(lights):
         span = range(int(own.spans[light]), int(own.spans[light + 1])) if design.own_ghosts else range(0)
@@ -181,6 +192,14 @@ def _with_ghost_targets(own: Objective, design: Design, structure: Structure) ->
         own, targets=np.array(targets).reshape(-1, 3), weights=np.array(weights).reshape(-1, 3),
         spans=np.array(spans, dtype=np.int64), names=tuple(labels),
     )  # fmt: skip
+
+
+def _moves_own(ghost_target: GhostTarget) -> bool:
+    """Return whether a target gives one of the lens' own ghosts another place, size or brightness."""
+    given = ghost_target.place_mm is not None or ghost_target.radius_mm is not None
+    factors = (ghost_target.height, ghost_target.brightness)
+    changed = given or ghost_target.move_mm != 0.0 or factors != (1.0, 1.0)
+    return ghost_target.ghost is not None and ghost_target.action == "want" and changed
 
 
 def _changed(target: Floats, weight: Floats, ghost_target: GhostTarget, design: Design) -> tuple[Floats, Floats, bool]:
