@@ -143,6 +143,20 @@ def test_a_zoom_keeps_its_gaps_when_its_stop_moves(gaps):
         assert [row.thickness for row in other.rows] == pytest.approx([*thick[:1], thick[1] + thick[2], *thick[3:]])
 
 
+def test_a_zoom_whose_last_group_moves_is_not_resized():
+    """The distance of the sensor by the rows was written for all positions: the others were out of focus."""
+    lens = zoom(((1, 10.0), (4, 5.0)))
+    wide, tele = (first_order(at_position(lens, position)).sensor_distance for position in lens.positions)
+    assert abs(wide - tele) > 0.5
+    with pytest.raises(ProjectError, match=r"at 'tele', and .* remove its \[\[positions\]\]"):
+        resize_ghost(lens, (1, 0), 1.1)
+    assert resize_ghost(lens.replace(positions=()), (1, 0), 1.1).lens.sensor_distance == pytest.approx(wide)
+    # what a patent rounds moves no sensor
+    rounded = lens.replace(positions=tuple(p.replace(gaps=((1, 10.0), (4, 5.0 - 1e-3 * k)))
+                                           for k, p in enumerate(lens.positions)))  # fmt: skip
+    assert resize_ghost(rounded, (1, 0), 1.1).lens.positions == rounded.positions
+
+
 def test_the_sensor_stays_where_it_is_when_a_rear_stop_moves():
     rows = list(zoom(((1, 10.0),)).rows)
     rows.append(rows.pop(2))

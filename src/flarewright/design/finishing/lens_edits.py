@@ -12,7 +12,7 @@ from ...errors import LensError, ProjectError
 from ...kernels.design import ghosts as columns
 from ...model import Lens, Position, Stop, Surface
 from ...optics.lens.paraxial import FirstOrder, first_order
-from ...optics.lens.zoom import gaps_without_row
+from ...optics.lens.zoom import at_position, gaps_without_row
 from ...render.scene.resolve import complete_lens
 from ...sentences import INVALID, validation_sentences
 from ...typing import Floats
@@ -25,6 +25,8 @@ TRIED = 4000
 HALVINGS = 60
 # largest semi-diameter of a surface as a fraction of its radius
 STEEPEST = 0.98
+# positions of a zoom have one sensor if its distances differ by less than this part of the focal length: patents round
+ONE_SENSOR = 5e-3
 
 
 @dataclass(frozen=True)
@@ -79,11 +81,13 @@ def resize_ghost(
     Raises
     ------
     ProjectError
-        When the lens has no such ghost, or no curvature of that row gives this size.
+        When the lens has no such ghost, no curvature of that row gives this size, or the sensor of a zoom has another
+        distance in each position.
     LensError
         When the lens forms no image any more, or a lens file cannot hold its f-number.
     """
     structure, order, vector, entrance = _numbers_of(lens, f_number)
+    _check_one_sensor(lens, order)
     if ghost not in structure.pairs:
         raise ProjectError(
             f"{lens.name} has no ghost {ghost[0]}-{ghost[1]} that reflects twice on one side of the stop; "
@@ -107,6 +111,18 @@ def resize_ghost(
     # the same stop diameter gives another f-number when the lens in front of the stop changes
     bent = complete_lens(opened_to(bent, float(vector[0])))
     return Resized(bent, row, structure.pairs, before, _ghosts(structure, vector, entrance))
+
+
+def _check_one_sensor(lens: Lens, order: FirstOrder) -> None:
+    """Raise an error for a zoom whose last surface moves: a lens file has one distance of the sensor."""
+    for position in lens.positions:
+        distance = first_order(at_position(lens, position)).sensor_distance
+        if abs(distance - order.sensor_distance) > ONE_SENSOR * order.efl:
+            raise ProjectError(
+                f"the sensor of {lens.name} stands {distance:.4g} mm behind its last surface at {position.name!r}, and "
+                f"{order.sensor_distance:.4g} mm by the gaps of its rows, but a resized lens keeps one distance; "
+                "remove its [[positions]]"
+            )
 
 
 def _numbers_of(lens: Lens, f_number: float | None) -> tuple[Structure, FirstOrder, Floats, float]:
