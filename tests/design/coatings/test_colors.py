@@ -32,7 +32,7 @@ from flarewright.design.solvers.evolution_log import Limits
 from flarewright.design.solvers.solvers import chosen
 from flarewright.errors import ProjectError
 from flarewright.measure.core.checkpoint import journal
-from flarewright.model import Design, GhostTarget, Light, Preset, Project
+from flarewright.model import Camera, Design, GhostTarget, Light, Plate, Preset, Project
 from flarewright.model.project.design import Bounds
 from flarewright.optics.coatings.thin_film import stack_reflectance
 from flarewright.optics.lens.paths import ghost_path
@@ -271,6 +271,21 @@ def test_a_lens_without_a_surface_in_air_cannot_be_coated():
 def test_colours_are_for_ghosts_of_the_lens(ghost_target):
     with pytest.raises(ProjectError, match="own ghosts"):
         color_problem(project(ghost_target), "film")
+
+
+def test_a_coated_zoom_keeps_its_positions_and_plates_are_refused():
+    """The written lens was that at the project's zoom, without positions, and a filter was among its rows."""
+    lights = (Light(field_deg=(5.0, 5.0)),)
+    given = Project(lens="canon-70-200", zoom="tele", lights=lights)
+    problem, lens = color_problem(given, "quarter-wave")
+    coats = coated(lens, problem.rows, problem.kind, np.full((len(problem.rows), 1), 500.0))
+    assert coats.positions == load_lens("canon-70-200").positions
+    for changes, words in (
+        ({"filter": Plate(thickness=2.0)}, "filter is no part"),
+        ({"camera": Camera(cover_glass=Plate(thickness=1.0))}, "camera.cover_glass is no part"),
+    ):
+        with pytest.raises(ProjectError, match=words):
+            color_problem(given.replace(**changes), "quarter-wave")
 
 
 def test_colours_without_any_weight_are_refused():

@@ -339,21 +339,28 @@ def color_problem(
     -------
     problem : ColorProblem
     lens : Lens
-        With the project's coatings.
+        That of the project with all its positions, and with the project's coatings.
 
     Raises
     ------
     FlarewrightError
-        When a target names a ghost that the lens does not have, or is for a new ghost.
+        When a target names a ghost that the lens does not have, or is for a new ghost, or the project has a filter or
+        a cover glass.
     """
     design = project.design or Design()
-    settled = resolve_project(project)
-    choice = resolve_coatings(settled.lens, project.coating)
+    plates = {"filter": project.filter, "camera.cover_glass": project.camera.cover_glass}
+    for key, plate in plates.items():
+        if plate is not None:
+            # it would become rows of the written lens, in front of which the project puts it again
+            raise ProjectError(f"{key} is no part of the lens to coat; leave it out of the project")
+    # neither zoom nor focus changes glasses and coatings
+    given = resolve_project(project).opened.lens
+    choice = resolve_coatings(given, project.coating)
     rows = tuple(
         row.replace(coating=coating) if isinstance(row, Surface) else row
-        for row, coating in zip(settled.lens.rows, choice, strict=True)
+        for row, coating in zip(given.rows, choice, strict=True)
     )
-    lens: Lens = settled.lens.replace(rows=rows)
+    lens: Lens = given.replace(rows=rows)
     structure = structure_of(lens)
     targets = own_colors(lens, structure)
     weights, hue_only = np.ones(len(targets)), np.zeros(len(targets), np.bool_)
