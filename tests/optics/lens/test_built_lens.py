@@ -24,6 +24,7 @@ from flarewright.model import (
 from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.optics.lens.tolerances import glass_groups
+from flarewright.optics.lens.zoom import at_position
 from flarewright.render.analysis import ghosts
 from flarewright.render.scene.direct_image import defocus_mm
 from flarewright.render.scene.opening import make_opening
@@ -228,6 +229,18 @@ def test_a_zoom_meets_the_focal_length_it_is_set_to(efl):
     assert first_order(set_to).efl == pytest.approx(float(str(efl).removesuffix("mm")), rel=1e-8)
     assert set_to.positions == ()
     assert 6.35 < set_to.field_deg < 16.7
+
+
+def test_a_filter_in_front_of_a_zoom_at_the_gaps_of_its_rows():
+    """The moving gaps kept their numbers among rows that had others, so a gap of glass was called moving."""
+    zoom = load_lens("canon-70-200")
+    filtered = build(zoom, filter_plate=Plate(thickness=2.0)).lens
+    assert first_order(filtered).efl == pytest.approx(first_order(zoom).efl)
+    for before, after in zip(zoom.positions, filtered.positions, strict=True):
+        gaps = [
+            [row.thickness for row in at_position(lens, one).rows] for lens, one in ((zoom, before), (filtered, after))
+        ]
+        assert gaps[1][2:] == gaps[0]
 
 
 def test_what_a_zoom_cannot_do_is_told():

@@ -40,7 +40,12 @@ def with_filter(lens: Lens, plate: Plate, medium: Medium) -> Lens:
     faces = _faces(plate, medium, FILTER_GAP if plate.gap is None else plate.gap)
     moved = tuple(element.replace(rows=(element.rows[0] + 2, element.rows[1] + 2)) for element in lens.elements)
     presets = {name: (plate.coating, plate.coating, *rows) for name, rows in lens.coating_presets.items()}
-    return lens.replace(rows=(*faces, *lens.rows), elements=moved, coating_presets=presets)
+    positions = tuple(
+        position.replace(gaps=tuple((row + 2, gap) for row, gap in position.gaps)) for position in lens.positions
+    )
+    return lens.replace(
+        rows=(*faces, *lens.rows), elements=moved, coating_presets=presets, positions=positions
+    )  # fmt: skip
 
 
 def with_cover_glass(
