@@ -99,7 +99,8 @@ def write(
     infos = []
     for k, view in enumerate([*before[:last_from], *born[last_from:]]):
         x, y, cosine, sine, _ = (float(each) for each in view.frame)
-        along = focal * float(np.tan(np.radians(angles[k])))
+        # the frame of a view points to its light
+        along = focal * float(np.tan(np.radians(abs(angles[k]))))
         info = FrameInfo(
             file=f"frames/{k:03d}.exr", constellation_deg=float(angles[k]), nominal_deg=float(angles[k]),
             roll_deg=roll_deg, nominal_roll_deg=roll_deg, light_px=(x + along * cosine, y - along * sine),
@@ -122,7 +123,7 @@ def rough_model(run: MergedRun, ghosts: Sequence[Shape] = SMALL_GHOSTS[:1]) -> G
     angles = [frame.constellation_deg for frame in run.frames]
     found = [DetectedGhost((one, one, one), 0, len(angles) - 1) for one in ghosts]
     return GhostModel(
-        size_px=run.size_px, axis_px=run.axis_px, focal_px=run.px_per_rad, largest_deg=max(angles),
+        size_px=run.size_px, axis_px=run.axis_px, focal_px=run.px_per_rad, largest_deg=max(map(abs, angles)),
         constellation_deg=(min(angles), max(angles)),
         ghosts=to_model(found, views((), angles=angles, size=run.size_px)),
     )  # fmt: skip

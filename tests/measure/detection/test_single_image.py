@@ -5,7 +5,7 @@ import pytest
 
 from flarewright.errors import FlarewrightError
 from flarewright.measure.detection.single_image import spots_of_model, spots_of_picture
-from flarewright.model.measurement.ghost_model import AberrationGhost, BezierGhost, Channel, GhostModel
+from flarewright.model.measurement.ghost_model import AberrationGhost, BezierGhost, Channel, Curve, Curves, GhostModel
 
 SIZE = (480, 320)
 AXIS = (236.0, 165.0)
@@ -116,6 +116,21 @@ def test_a_denominator_enlarges_the_disc():
     assert one.place_px == pytest.approx(lands.mean(), rel=0.01)
     upwards = y * 20.0 * y / (0.5 + 0.4 * x)
     assert one.radius_px == pytest.approx(abs((x * lands + upwards).sum()) / (x**2 + y**2).sum(), rel=0.02)
+
+
+def test_places_count_towards_the_light_on_both_sides_of_the_axis():
+    """At negative constellations the places of aberrated ghosts had the wrong sign, those of Bezier ghosts had not."""
+    numbers = [0.0] * 19
+    numbers[0], numbers[2], numbers[16] = 40.0, 12.0, 0.5
+    curves = Curves(along_px=Curve(values=(3.0,), error=(0.1,)))
+    both = (
+        aberrated(150.0, -30.0, (-20.0, 20.0)).replace(curves=curves),
+        BezierGhost(name="b", numbers=tuple((value,) for value in numbers), visible_deg=(-20.0, 20.0)),
+    )
+    sides = model(*both).replace(constellation_deg=(-20.0, 20.0))
+    here, there = ([one.place_px for one in spots_of_model(sides, angle)] for angle in (10.0, -10.0))
+    assert there == pytest.approx(here)
+    assert here[0] > 0.0
 
 
 def test_a_bezier_ghost_is_a_disc():

@@ -12,13 +12,13 @@ from flarewright.io.measurement.ghost_model_file import read_ghost_model, write_
 from flarewright.kernels.ghost_model.bezier import BORDER, INNER
 from flarewright.kernels.ghost_model.pupil_mesh import FIRST_G, FIRST_I
 from flarewright.measure.core.checkpoint import Journal
-from flarewright.measure.core.parameter_vector import bezier_numbers, with_bounded_controls
+from flarewright.measure.core.parameter_vector import bezier_numbers, field, with_bounded_controls
 from flarewright.measure.core.parameters import Shape
 from flarewright.measure.fitting.ghost_fit import render
 from flarewright.measure.pipeline import find_stage
 from flarewright.measure.replay.model_image import draw
 from flarewright.measure.walch.gradient_descent import circle
-from flarewright.measure.walch.per_frame_fit import _coloured, _compressed
+from flarewright.measure.walch.per_frame_fit import _coloured, _compressed, fit_as_walch
 from flarewright.measure.walch.settings import WalchSettings
 from flarewright.workflow import measure_run
 
@@ -44,6 +44,18 @@ def test_both_sides_of_the_axis_share_their_polynomials():
     one_sided = _compressed("1", angles[:4], numbers[:4], WalchSettings())
     assert bezier_numbers(one_sided, -10.0)[0] == pytest.approx(43.0, abs=1e-6)
     assert len(ghost.numbers[0]) == len(one_sided.numbers[0]) == 2
+
+
+def test_a_ghost_left_of_the_axis_is_followed_where_it_lies(tmp_path):
+    """The descent began on the wrong side of the axis where the light was left of it."""
+    angles = -np.linspace(24.0, 2.0, 4)
+    run = write_small(tmp_path, SMALL_GHOSTS[:1], angles=angles)
+    rough = rough_model(run, SMALL_GHOSTS[:1])
+    his = fit_as_walch(tmp_path, run, rough, residual=False, settings=WalchSettings(rounds=2))
+    for angle in angles:
+        assert bezier_numbers(his.ghosts[0], float(angle))[0] == pytest.approx(
+            SMALL_GHOSTS[0].numbers[0] * abs(field(angle, 24.0)), abs=5.0
+        )
 
 
 def test_control_points_bend_no_border_sharper_than_is_drawn():

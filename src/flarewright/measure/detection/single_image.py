@@ -189,7 +189,8 @@ def spots_of_model(model: GhostModel, constellation_deg: float) -> tuple[Spot, .
 
 def _disc(ghost: AberrationGhost, model: GhostModel, constellation_deg: float) -> Spot:
     """Return the disc that fits the mapped pupil of a ghost best, by least squares of position + radius p."""
-    s = field(constellation_deg, model.largest_deg)
+    # places count towards the light, on either side of the axis
+    s = abs(field(constellation_deg, model.largest_deg))
     rings, turns = np.sqrt((np.arange(8) + 0.5) / 8.0), 2.0 * np.pi * np.arange(24) / 24.0
     px, py = (np.outer(rings, part(turns)).ravel() for part in (np.cos, np.sin))
     u, v, w = px * px + py * py, px * s, np.full(px.size, s * s)

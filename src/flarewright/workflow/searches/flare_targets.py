@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from math import atan, atan2, degrees, hypot, radians, tan
 from pathlib import Path
 
@@ -56,11 +55,7 @@ def project_of_model(
     for x, y in lights_deg:
         constellation = degrees(atan(hypot(tan(radians(x)), tan(radians(y)))))
         side, _ = measured_side(model, constellation)
-        spots = spots_of_model(model, side)
-        if side < 0.0:
-            # this light lies towards the negative
-            spots = tuple(replace(spot, place_px=-spot.place_px) for spot in spots)
-        lights.append(((x, y), _striking(spots, pixel, most)))
+        lights.append(((x, y), _striking(spots_of_model(model, side), pixel, most)))
     sensor = (width, width * model.size_px[1] / model.size_px[0])
     return seen_project(lights, size_px=model.size_px, sensor_mm=sensor, focal_mm=model.focal_px * pixel)
 
