@@ -54,7 +54,8 @@ def project_of_model(
     lights = []
     for x, y in lights_deg:
         constellation = degrees(atan(hypot(tan(radians(x)), tan(radians(y)))))
-        side, _ = measured_side(model, constellation)
+        # the side where the light lies, if it was measured: a ghost may have been found on one side only
+        side, _ = measured_side(model, -constellation if x < 0.0 else constellation)
         lights.append(((x, y), _striking(spots_of_model(model, side), pixel, most)))
     sensor = (width, width * model.size_px[1] / model.size_px[0])
     return seen_project(lights, size_px=model.size_px, sensor_mm=sensor, focal_mm=model.focal_px * pixel)
