@@ -12,12 +12,12 @@ from flarewright.io.measurement.ghost_model_file import read_ghost_model, write_
 from flarewright.kernels.ghost_model.bezier import BORDER, INNER
 from flarewright.kernels.ghost_model.pupil_mesh import FIRST_G, FIRST_I
 from flarewright.measure.core.checkpoint import Journal
-from flarewright.measure.core.parameter_vector import bezier_numbers, field, with_bounded_controls
+from flarewright.measure.core.parameter_vector import bezier_numbers, field, frame, with_bounded_controls
 from flarewright.measure.core.parameters import Shape
 from flarewright.measure.fitting.ghost_fit import render
 from flarewright.measure.pipeline import find_stage
 from flarewright.measure.replay.model_image import draw
-from flarewright.measure.walch.gradient_descent import circle
+from flarewright.measure.walch.gradient_descent import circle, descend_gradient, draw_single
 from flarewright.measure.walch.per_frame_fit import _coloured, _compressed, fit_as_walch
 from flarewright.measure.walch.settings import WalchSettings
 from flarewright.workflow import measure_run
@@ -77,6 +77,17 @@ def test_red_and_blue_are_as_bright_as_the_picture_shows_them():
     others = np.ones(numbers.size, bool)
     others[[*range(BORDER, BORDER + 3), *range(INNER, INNER + 3)]] = False
     np.testing.assert_array_equal(found[others], numbers[others])
+
+
+@pytest.mark.parametrize(("red", "unit"), [(1.0, 1.0), (0.0, 1.0), (1.0, 1e-7)])
+def test_brightness_is_found_whatever_the_colour_and_the_unit(red, unit):
+    """The step followed red, though green is fitted, and no level fell below 1e-6 of the files' unit."""
+    size, at = (48, 40), frame((10.0, 20.0), 0.0, 10.0, 1.0)
+    window = 0, 0, *size
+    true = circle(14.0, 8.0, *np.outer([0.2, 0.3], [1.0, 1.0, 1.0]) * unit)
+    begin = circle(14.0, 8.0, *np.outer([0.6, 0.6], [red, 1.0, 1.0]) * unit)
+    found = descend_gradient(begin, draw_single(true, at, window)[..., 1], at, window, rounds=40).numbers
+    assert found[[BORDER + 1, INNER + 1]] == pytest.approx(np.array([0.2, 0.3]) * unit, rel=0.25)
 
 
 def test_a_stopped_fit_resumes_with_other_threads(tmp_path, capsys, monkeypatch):

@@ -90,7 +90,8 @@ def descend_gradient(
     numbers = start.copy()
     scale = 0.5 * (abs(numbers[3]) + abs(numbers[4]))
     steps = np.array([0.02 * scale] * 9 + [0.02 * scale] * 2 + [0.05] * 2)
-    level = max(float(numbers[BORDER]), 1e-12)
+    # pictures are of green; of a ghost that is dark there, the picture's light gives the step
+    level = max(float(numbers[BORDER + 1]), float(numbers[INNER + 1]), 1e-6 * float(np.abs(wanted).max()), 1e-300)
     groups = [(k, steps[k]) for k in range(13)] + [(BORDER, 0.05 * level), (INNER, 0.05 * level)]
     evaluations, wanted_edges = 0, edges(wanted)
 
@@ -102,7 +103,9 @@ def descend_gradient(
     def moved(at: int, by: float) -> Floats:
         trial = numbers.copy()
         trial[at : at + 3 if at >= BORDER else at + 1] += by
-        trial[2:5], trial[9:] = np.maximum(trial[2:5], 0.5), np.maximum(trial[9:], 1e-6)
+        trial[2:5], trial[9:BORDER] = np.maximum(trial[2:5], 0.5), np.maximum(trial[9:BORDER], 1e-6)
+        # radiance has no natural least value
+        trial[BORDER:] = np.maximum(trial[BORDER:], 0.0)
         return with_bounded_controls(trial)
 
     # the learning rate is halved after a round without progress
