@@ -172,6 +172,25 @@ def test_passes_are_graded_and_the_residual_goes_with_the_ghosts(project):
         assert np.array_equal(changed[name].pixels, np.float32(gain) * plain[name].pixels)
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [{"output": {"starburst": False}}, {"art": Art(gain={"scatter": 0.25})}, {"art": Art(gain={"ghosts": 3.0})}],
+)
+def test_no_pixel_is_below_0_without_the_star_or_with_other_gains(project, tmp_path, changes):
+    """The residual also corrects star and halo; where they were dimmed or left out, the picture had negative light."""
+    path = tmp_path / "model.json"
+    less = sprite([slope() - 20.0 * k for k in range(26)])
+    write_ghost_model(path, model_of(project).replace(sprites=(less,)))
+    assert pixels(project).min() == pytest.approx(0.0, abs=1e-5)
+    changed = layers(project.replace(**changes))
+    assert changed["beauty"].pixels.min() >= -1e-5 * changed["beauty"].pixels.max()
+    # elsewhere the residual is as before
+    plain = layers(project)
+    kept = plain["residual"].pixels > 0.0
+    by = 3.0 if "ghosts" in changes.get("art", Art()).gain else 1.0
+    np.testing.assert_allclose(changed["residual"].pixels[kept], by * plain["residual"].pixels[kept], rtol=1e-6)
+
+
 def test_the_cameras_colours_become_those_of_the_picture(project, tmp_path):
     matrix = ((1.6, -0.4, -0.2), (-0.3, 1.5, -0.2), (0.1, -0.6, 1.5))
     path = tmp_path / "colours.json"

@@ -193,12 +193,15 @@ def render_measured(project: Project, *, progress: Progress | None = None, limit
         # `check_finite` reports an overflow below
         with np.errstate(over="ignore", invalid="ignore"):
             parts["ghosts"] = _ghosts_by_hand(flare, seen, gains, size)
-            _keep_above_0(parts)
     if not project.output.starburst:
         parts.pop("starburst", None)
     by_pass = {} if project.art.physical else project.art.gain
+    changed = gains or not project.output.starburst or any(gain != 1.0 for gain in by_pass.values())
     with np.errstate(over="ignore", invalid="ignore"):
-        passes = [with_gain(layer, by_pass.get(_PASSES[name], 1.0)) for name, layer in parts.items()]
+        parts = {name: with_gain(layer, by_pass.get(_PASSES[name], 1.0)) for name, layer in parts.items()}
+        if changed:
+            _keep_above_0(parts)
+        passes = list(parts.values())
         others = [with_gain(layer, by_pass.get("ghosts", 1.0)) for layer in _brightest(project, flare, singles, gains)]
         passes, others = apply_gamut(project.output.gamut, passes), apply_gamut(project.output.gamut, others)
         total = beauty(passes, size)
@@ -326,7 +329,7 @@ def _ghosts_by_hand(
 
 
 def _keep_above_0(parts: dict[str, Layer]) -> None:
-    """Limit the residual so that the sum is not negative; the residual also corrects ghosts that rules removed."""
+    """Limit the residual so that the sum is not negative; it also corrects ghosts, star and halo that are not drawn."""
     rest = parts.get("residual")
     if rest is not None:
         others = sum(layer.pixels for name, layer in parts.items() if name != "residual")
