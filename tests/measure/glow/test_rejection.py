@@ -7,7 +7,12 @@ import pytest
 from planted_run import SIZE, shape, views
 
 from flarewright.measure.fitting.detected_ghost import DetectedGhost
-from flarewright.measure.glow.rejection import is_residual_glow, with_glow_unwanted, without_glow
+from flarewright.measure.glow.rejection import (
+    is_residual_glow,
+    with_glow_among_removed,
+    with_glow_unwanted,
+    without_glow,
+)
 from flarewright.measure.glow.subtraction import AROUND_LIGHT
 
 # distance of the light from the axis at field 1, pixels
@@ -95,3 +100,13 @@ def test_a_ghost_that_residual_glow_outshines_where_it_lies_is_part_of_it(ghost,
     shown = views_with_glow(1.0)
     assert without_glow([ghost], shown) == [ghost]
     assert without_glow([glow, ghost], shown) == ([ghost] if stays else [])
+
+
+@pytest.mark.parametrize(("removed", "stays"), [(found(-WAY, 40.0, 0.8), True), (found(WAY, 60.0, 0.05), False)])
+def test_a_ghost_that_the_user_removed_takes_no_other_with_it(removed, stays):
+    """All ghosts that were fainter than a removed one where it lies were left out, unnoticed."""
+    faint = found(removed.shapes[1].numbers[0] * 0.85, 20.0, 0.04)
+    shown = views_with_glow(1.0, (removed.shapes[1], faint.shapes[1]))
+    marked = with_glow_among_removed([replace(removed, unwanted=True), faint], shown)
+    assert [ghost.glow for ghost in marked] == [not stays, False]
+    assert without_glow(marked, shown) == (marked[1:] if stays else [])

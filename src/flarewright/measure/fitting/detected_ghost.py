@@ -35,6 +35,8 @@ class DetectedGhost:
         Fit of each colour; None before the first fit.
     unwanted : bool
         Rejected by the user or as residual glow: the fit keeps it to explain its light, but the model omits it.
+    glow : bool
+        Rejected as residual glow; what the user rejects is light of its own.
     """
 
     shapes: tuple[Shape, Shape, Shape]
@@ -42,6 +44,7 @@ class DetectedGhost:
     last: int
     fits: tuple[Fit | None, Fit | None, Fit | None] = (None, None, None)
     unwanted: bool = False
+    glow: bool = False
 
 
 def by_brightness(ghosts: Sequence[DetectedGhost]) -> list[int]:

@@ -69,7 +69,27 @@ def with_glow_unwanted(
     """
     near = replace(settings, limits=tuple(limit for limit in settings.limits if isfinite(limit[0])))
     glow = is_residual_glow(detected, views, near)
-    return [replace(ghost, unwanted=ghost.unwanted or left) for ghost, left in zip(detected, glow, strict=True)]
+    return [
+        replace(ghost, unwanted=ghost.unwanted or left, glow=ghost.glow or left)
+        for ghost, left in zip(detected, glow, strict=True)
+    ]
+
+
+def with_glow_among_removed(
+    ghosts: Sequence[DetectedGhost], views: Sequence[View], settings: RejectionSettings = RejectionSettings()
+) -> list[DetectedGhost]:
+    """Mark which of the ghosts that an earlier search or the user removed are residual glow.
+
+    Parameters
+    ----------
+    ghosts : sequence of DetectedGhost
+        As the search left them.
+    views : sequence of View
+        As photographed, in the same pixels.
+    settings : RejectionSettings
+    """
+    glow = is_residual_glow(ghosts, views, settings)
+    return [replace(ghost, glow=ghost.unwanted and left) for ghost, left in zip(ghosts, glow, strict=True)]
 
 
 def without_glow(
@@ -88,11 +108,11 @@ def without_glow(
     Returns
     -------
     list of DetectedGhost
-        Without those that `is_residual_glow` or `with_glow_unwanted` rejects, and without those outshone by them where
-        they lie: a fit determines only the sum of such a ghost and the residual glow.
+        Without those that are unwanted or that `is_residual_glow` rejects, and without those outshone by residual glow
+        where they lie: a fit determines only the sum of such a ghost and the residual glow.
     """
     near = is_residual_glow(ghosts, views, settings)
-    glow = [ghost for ghost, left in zip(ghosts, near, strict=True) if left or ghost.unwanted]
+    glow = [ghost for ghost, left in zip(ghosts, near, strict=True) if left or ghost.glow]
     masks = masks_of(views)
     return [
         ghost

@@ -28,7 +28,7 @@ from ..detection.split_ghosts import split_ghosts
 from ..fitting.alternating_fit import fit_all, to_model
 from ..fitting.detected_ghost import CHANNELS, DetectedGhost, by_brightness, residual_of
 from ..glow.fit import iris_of
-from ..glow.rejection import with_glow_unwanted, without_glow
+from ..glow.rejection import with_glow_among_removed, with_glow_unwanted, without_glow
 from ..glow.subtraction import fit_and_subtract_glow
 from ..residual.learn import with_residual
 from .search_images import mixed_for_search, model_of_run, scaled_ghost, search_views, star_of
@@ -76,6 +76,7 @@ def fit_ghosts(
         # keep the removed ghosts in the fit: without them the search would detect them again, and the other ghosts
         # would absorb their light
         found = [replace(_to_found(ghost, views), unwanted=k >= len(rough.ghosts)) for k, ghost in enumerate(ghosts)]
+        found = with_glow_among_removed(found, views, settings.glow.rejection)
         # a fixed order: sums in another order differ in their last digits, and the searches amplify that
         found = [found[k] for k in by_brightness(found)]
         dim = fit_and_subtract_glow(found, views, star_of(views, pool, settings.glow), pool, settings.glow)
