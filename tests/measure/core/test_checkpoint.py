@@ -182,7 +182,7 @@ def test_an_interrupted_stage_resumes_to_the_same_bytes(stage, file, staged, tmp
     assert capsys.readouterr().err.endswith(said)
     lines = (folder / f"{stage}.journal").read_text().splitlines()
     assert len(lines) == 1 + done // 2
-    assert json.loads(lines[0].partition(" ")[2])["journal"] == 12
+    assert json.loads(lines[0].partition(" ")[2])["journal"] == 13
     assert command(words) == 0
     assert f"resumes after {done // 2} steps" in capsys.readouterr().err
     assert (folder / file).read_bytes() == made

@@ -134,7 +134,7 @@ def journal(path: Path, digest: str, report: Report = lambda _: None) -> Iterato
     OutputError
         When the file cannot be written.
     """
-    head = {"journal": 12, "version": __version__, "digest": digest}
+    head = {"journal": 13, "version": __version__, "digest": digest}
     known = _read(path, head, report)
     text = "".join(_line(one) for one in (head, *known))
 

@@ -33,6 +33,8 @@ class View:
         Radiance; glow and known ghosts may be subtracted.
     variance : ndarray, shape (height, width, 3), float32
         Variance of the pixels; infinite where nothing was measured.
+    nominal_roll_deg : float
+        Roll as listed in captures.csv; views of one roll make a series.
     """
 
     constellation_deg: float
@@ -41,6 +43,7 @@ class View:
     light_px: tuple[float, float]
     pixels: Pixels
     variance: Pixels
+    nominal_roll_deg: float = 0.0
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -111,7 +114,7 @@ def views_of(frames: Sequence[MergedFrame], largest_deg: float | None = None) ->
         View(
             each.constellation_deg, abs(field(each.constellation_deg, largest)),
             frame(each.axis_px, each.roll_deg, each.constellation_deg, 1.0), each.light_px, each.radiance,
-            each.variance,
+            each.variance, each.info.nominal_roll_deg,
         )
         for each in frames
     ]  # fmt: skip

@@ -92,7 +92,7 @@ def replay_model(
     within_reach(model, constellation_deg, roll_deg)
     size = size_px or model.size_px
     about: dict[str, str | float] = {"constellation_deg": constellation_deg, "roll_deg": roll_deg}
-    constellation_deg, roll_deg = _photographed_side(model, constellation_deg, roll_deg)
+    model, constellation_deg, roll_deg = _photographed_place(model, constellation_deg, roll_deg)
     parts = _held(pack(model), model, constellation_deg, roll_deg, size)
     layers = [
         Layer(name, (gain * light).astype(np.float32), (0, 0, *size), about if name == "ghosts" else {})
@@ -102,6 +102,41 @@ def replay_model(
     singles = _single(model, constellation_deg, roll_deg, size, gain) if single else []
     drawn = (whole, *layers, *singles)
     return drawn if colors == "camera" else tuple(_in_rec709(layer, model) for layer in drawn)
+
+
+def _photographed_place(
+    model: GhostModel, constellation_deg: float, roll_deg: float
+) -> tuple[GhostModel, float, float]:
+    """Return the model with the sprites of one series of captures, and the place of the light as that series shows it.
+
+    Of several series, the one that shows the constellation and is nearest in roll.
+    """
+    rolls = {one.captured_roll_deg for one in model.sprites if one.captured_roll_deg is not None}
+    if len(rolls) < 2:
+        return model, *_photographed_side(model, constellation_deg, roll_deg)
+    (low, high), places = model.constellation_deg, [(constellation_deg, roll_deg)]
+    if low <= -constellation_deg <= high:
+        places.append((-constellation_deg, roll_deg + 180.0))
+
+    def misses(offer: tuple[float, tuple[float, float]]) -> tuple[bool, float]:
+        captured, (angle, roll) = offer
+        series = _of_series(model, captured)
+        angles = next((one.constellation_deg for one in series.sprites if one.follows == "ghosts"), (low, high))
+        # a picture of a sprite can stand for several captures
+        step = max(np.diff(angles).max(initial=0.0), JITTER_DEG)
+        beyond = not angles[0] - step <= angle <= angles[-1] + step
+        return beyond, abs((roll - captured + 180.0) % 360.0 - 180.0)
+
+    captured, place = min(((captured, place) for captured in sorted(rolls) for place in places), key=misses)
+    return _of_series(model, captured), *place
+
+
+@lru_cache(maxsize=8)
+def _of_series(model: GhostModel, captured_roll_deg: float) -> GhostModel:
+    """Return a model with the sprites that were learned from the captures of one roll, and those of all."""
+    sprites = tuple(one for one in model.sprites if one.captured_roll_deg in (None, captured_roll_deg))
+    # `replace` validates the copy, and large sprites take long
+    return model.model_copy(update={"sprites": sprites})
 
 
 def _photographed_side(model: GhostModel, constellation_deg: float, roll_deg: float) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from ...model.measurement.ghost_model import GhostModel
+from ...model.measurement.sprite import Sprite
 from ...typing import Mask, Pixels
 from ..core.checkpoint import Journal
 from ..core.parallel import map_batched
@@ -37,28 +38,45 @@ def with_residual(
     ----------
     model : GhostModel
     views : sequence of View
-        As photographed.
+        As photographed. Those of each nominal roll make sprites of their own, of which a replay draws the nearest.
     threads : int, optional
     journal : Journal, optional
         Journal of an interrupted run to resume; it does not change the result.
     """
     steps = journal or Journal()
+    rolls = sorted({view.nominal_roll_deg for view in views})
+    # the residual of one roll does not become that of another by turning, so each roll has sprites of its own
+    series = [[view for view in views if view.nominal_roll_deg == roll] for roll in rolls]
+    learned = [_sprites_of(model, each, threads, steps, len(rolls)) for each in series]
+    if len(rolls) > 1:
+        learned = [
+            [one.replace(captured_roll_deg=roll) for one in sprites]
+            for roll, sprites in zip(rolls, learned, strict=True)
+        ]
+    return model.replace(sprites=tuple(one for sprites in learned for one in sprites))
+
+
+def _sprites_of(
+    model: GhostModel, views: Sequence[View], threads: int | None, steps: Journal, series: int
+) -> Sequence[Sprite]:
+    """Learn the sprites of the views of one roll, of `series` rolls."""
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         placed = [replace(view, light_px=light_of_view(model, view)) for view in views]
         left = map_batched(partial(_left_by, model), placed, pool=pool)
-        spikes = steps.step(lambda: spike_sprites(placed, left, model.star))
+        spikes = steps.step(lambda: spike_sprites(placed, left, model.star, series))
         left = beside_sprites(left, spikes, placed, pool)
         # coarse images overshoot beside the light's image; finer ones correct that only where values are known
         around = map_batched(around_light, placed, left, pool=pool)
-        going = steps.step(lambda: light_sprites(placed, around, model.star is not None, pool))
+        going = steps.step(lambda: light_sprites(placed, around, model.star is not None, pool, series))
         left = beside_sprites(left, going, placed, pool)
         # next to the light a pixel's error exceeds everything that turns about the axis
         next_to_light = [off_light(view) < NEXT_TO_LIGHT * view.size_px[0] for view in placed]
-        axis = steps.step(lambda: axis_sprite(placed, all_hidden(left, next_to_light, pool), pool))
+        axis = steps.step(lambda: axis_sprite(placed, all_hidden(left, next_to_light, pool), pool, series))
         left = beside_sprites(left, (axis,), placed, pool)
     still = model.replace(sprites=(*spikes, *going, axis))
     moving = still.replace(sprites=steps.step(lambda: with_moves(still, threads).sprites))
-    return with_reaches(with_detail(moving, placed, all_hidden(left, next_to_light), threads), placed, threads)
+    fine = with_detail(moving, placed, all_hidden(left, next_to_light), threads)
+    return with_reaches(fine, placed, threads).sprites
 
 
 def all_hidden(

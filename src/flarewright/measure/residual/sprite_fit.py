@@ -47,8 +47,9 @@ _CHUNK = 2000
 
 
 def light_sprites(
-    views: Sequence[View], pixels: Sequence[Pixels], starry: bool, pool: ThreadPoolExecutor | None = None
-) -> tuple[Sprite, ...]:
+    views: Sequence[View], pixels: Sequence[Pixels], starry: bool, pool: ThreadPoolExecutor | None = None,
+    series: int = 1,
+) -> tuple[Sprite, ...]:  # fmt: skip
     """Learn the sprites that follow the light.
 
     Parameters
@@ -61,6 +62,8 @@ def light_sprites(
         Whether there is a star. It does not turn when the light rolls, nor do images within its core. All others turn
         with the light, as ghosts do.
     pool : executor, optional
+    series : int
+        Number of series of captures, of different rolls, that share the largest number of images.
 
     Returns
     -------
@@ -71,7 +74,7 @@ def light_sprites(
     finest = max(0, int(np.floor(np.log2(max(width / _COARSE, 1.0)))))
     left = list(pixels)
     found: list[Sprite] = []
-    angles = even_knots(views, min(_MOST_LIGHT, len(views) // VIEWS))
+    angles = even_knots(views, min(_MOST_LIGHT // series, len(views) // VIEWS))
     usual = float(np.median(np.unwrap([view.roll_deg for view in views], period=360.0)))
     for level in range(finest, -1, -1):
         grain = 2.0**level
@@ -90,12 +93,14 @@ def beside_sprites(
     return map_batched(lambda each, view: each - drawn(sprites, view), left, views, pool=pool)
 
 
-def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels], pool: ThreadPoolExecutor | None = None) -> Sprite:
+def axis_sprite(
+    views: Sequence[View], pixels: Sequence[Pixels], pool: ThreadPoolExecutor | None = None, series: int = 1
+) -> Sprite:
     """Learn the remaining residual, coarsely, about the axis.
 
     Parameters
     ----------
-    views, pixels, pool
+    views, pixels, pool, series
         As for `light_sprites`.
     """
     width, height = views[0].size_px
@@ -105,7 +110,7 @@ def axis_sprite(views: Sequence[View], pixels: Sequence[Pixels], pool: ThreadPoo
     low, high = np.floor(places.min(axis=0) / grain), np.ceil(places.max(axis=0) / grain)
     columns, rows = (high - low).astype(int)
     along, down = _middles(low[0] * grain, low[1] * grain, grain, int(rows), int(columns))
-    groups = np.array_split(np.arange(len(views)), min(len(views), _MOST_AXIS))
+    groups = np.array_split(np.arange(len(views)), min(len(views), max(1, _MOST_AXIS // series)))
 
     def of(group: Indices) -> tuple[Floats, Floats]:
         light, noise, total = np.zeros((3, rows, columns, 3))

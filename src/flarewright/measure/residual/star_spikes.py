@@ -31,7 +31,9 @@ _VIEWS, _MOST = 2, 25
 _ROUNDS = 2
 
 
-def spike_sprites(views: Sequence[View], pixels: Sequence[Pixels], star: Star | None) -> tuple[Sprite, ...]:
+def spike_sprites(
+    views: Sequence[View], pixels: Sequence[Pixels], star: Star | None, series: int = 1
+) -> tuple[Sprite, ...]:
     """Learn the light above its surroundings along the spikes of a star.
 
     Parameters
@@ -42,6 +44,8 @@ def spike_sprites(views: Sequence[View], pixels: Sequence[Pixels], star: Star | 
         Residual of the views, after the star's law too; NaN where nothing was measured.
     star : Star or None
         Gives the directions of the spikes.
+    series : int
+        As for `sprite_fit.light_sprites`.
 
     Returns
     -------
@@ -55,7 +59,7 @@ def spike_sprites(views: Sequence[View], pixels: Sequence[Pixels], star: Star | 
     half = min(_HALF * width, begin * tan(pi / max(star.spikes, 3)))
     if half < 2.0 * _SIDE + 1.0:
         return ()
-    angles = even_knots(views, min(_MOST, len(views) // _VIEWS))
+    angles = even_knots(views, min(_MOST // series, len(views) // _VIEWS))
     left, found = list(pixels), []
     for _ in range(_ROUNDS):
         strips = [

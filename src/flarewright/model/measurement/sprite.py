@@ -42,6 +42,9 @@ class Sprite(Frozen):
         blobs. "light": with rolls, the picture also turns with the light, about the light; without, it stays
         upright. "axis" and "ghosts": without rolls, the residual turns next to the axis as well; with rolls, it stays
         as photographed there.
+    captured_roll_deg : float or None
+        Nominal roll of the captures that it was learned from, where those of several rolls were; of these series of
+        sprites, only one is drawn. None: always drawn.
     stretch : float
         Length of a cell along its row relative to `grain_px`.
     constellation_deg : tuple of float
@@ -72,6 +75,7 @@ class Sprite(Frozen):
     corner_px: tuple[float, float]
     turn_deg: float = 0.0
     rolls_deg: tuple[float, ...] = ()
+    captured_roll_deg: float | None = None
     stretch: float = Field(default=1.0, gt=0.0)
     ghost: str | None = None
     spread_px: tuple[Annotated[float, Field(gt=0.0)], Annotated[float, Field(gt=0.0)]] = (1.0, 1.0)
