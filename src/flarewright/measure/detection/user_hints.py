@@ -17,6 +17,8 @@ from .rim_voting import RimCandidate
 
 # score of a candidate from the user, higher than that of all others
 _USER_SCORE = 1e9
+# largest difference of frames of several rolls at one constellation, by the turntable's jitter, degrees
+_SAME_DEG = 0.1
 
 
 def candidate(
@@ -64,9 +66,28 @@ def candidate(
         raise FlarewrightError(
             f"corrections: {_place(pointed)} is not in the picture of {run.size_px[0]} x {run.size_px[1]} pixels"
         )
-    x, y, cosine, sine, _ = views[at].frame
-    along = (pointed.centre_px[0] - x) * cosine - (pointed.centre_px[1] - y) * sine
-    return RimCandidate(float(along / views[at].sigma) / factor, pointed.radius_px / factor, 0, looked - 1, _USER_SCORE)
+    along, sigma = _placed(pointed, views, at)
+    return RimCandidate(float(along / sigma) / factor, pointed.radius_px / factor, 0, looked - 1, _USER_SCORE)
+
+
+def _placed(pointed: MarkedGhost, views: Sequence[View], nearest: int) -> tuple[float, float]:
+    """Return the position of a mark towards the light, and the field.
+
+    Captures of several rolls have one frame each at a constellation: ghosts lie on the light's line, so the mark is in
+    the frame whose line it is nearest.
+    """
+    series: dict[float, View] = {}
+    for view in sorted(views, key=lambda one: abs(one.constellation_deg - pointed.constellation_deg)):
+        series.setdefault(view.nominal_roll_deg, view)
+    here = views[nearest].constellation_deg
+    found = []
+    for view in series.values():
+        if abs(view.constellation_deg - here) <= _SAME_DEG and view.sigma > 0.0:
+            x, y, cosine, sine, _ = view.frame
+            right, down = pointed.centre_px[0] - x, pointed.centre_px[1] - y
+            found.append((abs(right * sine + down * cosine), right * cosine - down * sine, view.sigma))
+    _, along, sigma = min(found)
+    return float(along), sigma
 
 
 def report_marks(
