@@ -248,3 +248,24 @@ def test_rounding_changes_no_picture_of_correlated_parameters():
     after = cost_of(Shape(np.array(numbers)), patches, error=0.0)
     before = cost_of(fit.shape, patches, error=0.0)
     assert after - before < 3.0
+
+
+@pytest.mark.parametrize(("before", "fades"), [(0.0, True), (0.25, False)])
+def test_a_ghost_that_appears_at_once_is_not_drawn_a_frame_before(before, fades):
+    """It had all its light one frame too early: no curve of few knots follows a step."""
+    ghosts, angles = (shape(-60.0, 20.0, 1.0), shape(55.0, 14.0, 0.6)), ANGLES[2::2]
+
+    def poses(g, angle):
+        return Pose(1.0 if g or angle >= angles[4] else before * (angle >= angles[3]))
+
+    seen = drawn(ghosts, poses, angles=angles, size=STRIP)
+    small = compact_model(model_of(ghosts, "ab", STRIP), follow("ab", grey(ghosts), seen), seen)
+    one = small.ghosts[0]
+    if fades:
+        assert one.visible_deg[0] == pytest.approx(0.5 * (angles[3] + angles[4]), abs=2e-4)
+        assert one.fade_deg == (pytest.approx(angles[4] - angles[3]), 0.0)
+        drawn_early = replay_model(small, float(angles[3]))[0].pixels - seen[3].pixels
+        assert np.sqrt((drawn_early**2).mean()) < 0.02
+    else:
+        # some of it is there: that frame belongs to the curve
+        assert one.visible_deg[0] == pytest.approx(angles[3], abs=2e-4)

@@ -81,7 +81,8 @@ def compact_model(
     """
     tracked = {track.name: track for track in tracks.ghosts if track.lives}
     kept = [ghost for ghost in model.ghosts if isinstance(ghost, AberrationGhost) and ghost.name in tracked]
-    spans = [drawn_range(ghost, tracked[ghost.name]) for ghost in kept]
+    drawn = [drawn_range(ghost, tracked[ghost.name], settings) for ghost in kept]
+    spans = [span for span, _ in drawn]
     found = [_found(ghost, span, views) for ghost, span in zip(kept, spans, strict=True)]
     progress(0.0, count(len(kept), "ghost"))
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
@@ -93,16 +94,22 @@ def compact_model(
             found, spans, views, pool, steps, lambda part, words: progress(0.7 + 0.3 * part, words), settings
         )
     ghosts = tuple(
-        _model_ghost(ghost, each, span, curve, settings)
-        for ghost, each, span, curve in zip(kept, found, spans, curves, strict=True)
+        _model_ghost(ghost, each, span, fade, curve, settings)
+        for ghost, each, (span, fade), curve in zip(kept, found, drawn, curves, strict=True)
     )  # fmt: skip
     unseen = [ghost.name for ghost in model.ghosts if ghost.name not in tracked]
     remarks = (*model.remarks, f"dropped, as no frame shows them: {', '.join(unseen)}") if unseen else model.remarks
     return model.replace(ghosts=ghosts, remarks=remarks)
 
 
-def drawn_range(ghost: AberrationGhost, track: GhostTrack) -> tuple[float, float]:
-    """Return the range of constellations in which a ghost is drawn: all its lives, plus one frame to fade."""
+def drawn_range(
+    ghost: AberrationGhost, track: GhostTrack, settings: CompressionSettings = CompressionSettings()
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the range of constellations in which a ghost is drawn, and the widths over which it fades at the ends.
+
+    The range holds all its lives, plus one frame to fade. Where that frame shows nothing at all, it ends halfway to it:
+    no curve of few knots follows a step.
+    """
     first, last = track.lives[0], track.lives[-1]
     low, high = first.birth.constellation_deg, last.death.constellation_deg
     # where the frames are undecided, use the range of the fit
@@ -112,11 +119,22 @@ def drawn_range(ghost: AberrationGhost, track: GhostTrack) -> tuple[float, float
         high = max(high, ghost.visible_deg[1])
     angles = [step.constellation_deg for step in track.steps]
     below, above = [angle for angle in angles if angle < low], [angle for angle in angles if angle > high]
+    fade = [0.0, 0.0]
     if first.birth.how in ("fade", "frame") and below:
-        low = below[-1]
+        low, fade[0] = _faded(track, first.birth.how, below[-1], angles[len(below)], settings)
     if last.death.how in ("fade", "frame") and above:
-        high = above[0]
-    return low, high
+        high, fade[1] = _faded(track, last.death.how, above[0], angles[-len(above) - 1], settings)
+    return (low, high), (fade[0], fade[1])
+
+
+def _faded(
+    track: GhostTrack, how: str, beyond: float, inside: float, settings: CompressionSettings
+) -> tuple[float, float]:
+    """Return an end of the drawn range and the width of its fade, from the frames on both sides of a birth or death."""
+    step = next(one for one in track.steps if one.constellation_deg == beyond)
+    if how == "fade" and step.brightness is not None and step.brightness < settings.gone:
+        return 0.5 * (beyond + inside), abs(inside - beyond)
+    return beyond, 0.0
 
 
 def _found(ghost: AberrationGhost, span: tuple[float, float], views: Sequence[View]) -> DetectedGhost:
@@ -264,8 +282,8 @@ def _curves(
 
 
 def _model_ghost(
-    ghost: AberrationGhost, found: DetectedGhost, span: tuple[float, float], curves: Curves,
-    settings: CompressionSettings,
+    ghost: AberrationGhost, found: DetectedGhost, span: tuple[float, float], fade_deg: tuple[float, float],
+    curves: Curves, settings: CompressionSettings,
 ) -> AberrationGhost:  # fmt: skip
     colours: list[Channel] = []
     for shape, fit in zip(found.shapes, found.fits, strict=True):
@@ -275,12 +293,12 @@ def _model_ghost(
             numbers = written_numbers(shape, held_error(fit), settings)
             deviation = np.array([float(f"{d:.2g}") for d in deviation])
         colours.append(channel_of(numbers, shape.discs, deviation))
-    # keep the fade of the fit where its range is unchanged; elsewhere the brightness curve fades
-    same = zip(span, ghost.visible_deg, ghost.fade_deg, strict=True)
+    # keep the fade of the fit where its range is unchanged; elsewhere the brightness curve fades, or the end
+    same = zip(span, ghost.visible_deg, ghost.fade_deg, fade_deg, strict=True)
     return ghost.replace(
         red=colours[0], green=colours[1], blue=colours[2], curves=curves,
         visible_deg=(floor(1e4 * span[0]) / 1e4, ceil(1e4 * span[1]) / 1e4),
-        fade_deg=tuple(fade if end == old else 0.0 for end, old, fade in same),
+        fade_deg=tuple(fade if end == old else own for end, old, fade, own in same),
     )  # fmt: skip
 
 
