@@ -54,6 +54,18 @@ def test_two_views_without_a_ghost_end_its_range_and_one_does_not(gone, span):
     assert visible_range(one, shown, [view.pixels[..., 1] for view in shown], 5) == span
 
 
+def test_a_ghost_on_both_sides_of_the_axis_is_found_on_one_side():
+    """A ghost that only lights away from the axis gets votes of both sides; the views between showed nothing of it,
+    so it was refused though each side alone showed it.
+    """
+    one, angles = shape(-60.0, 15.0, 0.4), [-20, -16, -12, -8, -5, -2, 2, 5, 8, 12, 16, 20, 24]
+    shown = [view for angle in angles for view in views((one,) if abs(angle) > 9.0 else (), angles=[angle])]
+    own = [view.pixels[..., 1] for view in shown]
+    assert visible_range(one, shown, own, 6) == (9, 12)
+    # the other side, where the middle of the votes shows it
+    assert visible_range(one, shown, own, 1) == (0, 2)
+
+
 def test_a_ghost_in_too_few_views_keeps_its_range():
     one = shape(-60.0, 15.0, 0.4)
     dark = views(())

@@ -29,7 +29,8 @@ def visible_range(
     own : sequence of ndarray, shape (H, W)
         Pictures that hold this ghost alone: all other known ghosts are subtracted.
     middle : int
-        View in which it is visible.
+        View in the middle of its votes. Where nothing shows it there, as between both sides of the axis, the range
+        with the most visible views is returned.
     pool : executor, optional
     settings : FitSettings
 
@@ -38,7 +39,11 @@ def visible_range(
     The range ends at two consecutive views without the ghost. Undecided views, and views that the ghost lies outside
     of, count as visible.
     """
-    return _visible_range([each is not False for each in _visible(shape, views, own, 1, pool, settings)], middle)
+    seen = _visible(shape, views, own, 1, pool, settings)
+    first, last = _visible_range(_not_gone(seen), middle)
+    if seen[middle] is False and last - first + 1 < settings.lifetimes.least_views:
+        return _most_visible_range(seen, (first, last))
+    return first, last
 
 
 def update_ranges(
@@ -71,9 +76,7 @@ def update_ranges(
         ghost, lead = out[k], leads[k]
         lay_over(ghost.shapes[lead], ghost, views, left[lead], 1.0, pool)
         seen = _visible(ghost.shapes[lead], views, left[lead], lead, pool, settings)
-        # of all ranges around a visible view, the one with the most visible views
-        ranges = {_visible_range([each is not False for each in seen], at) for at, each in enumerate(seen) if each}
-        first, last = max(ranges, key=lambda one: (seen[one[0] : one[1] + 1].count(True), -one[0]), default=(0, 0))
+        first, last = _most_visible_range(seen, (0, 0))
         if last - first + 1 >= settings.lifetimes.least_views:
             out[k] = replace(ghost, first=first, last=last)
         lay_over(ghost.shapes[lead], out[k], views, left[lead], -1.0, pool)
@@ -95,6 +98,17 @@ def _visible(
         and seen.error <= settings.lifetimes.most_error else None
         for seen in presences(shape, alone, channel, pool=pool, settings=settings)
     ]  # fmt: skip
+
+
+def _not_gone(seen: Sequence[bool | None]) -> list[bool]:
+    """Return where a shape is visible or undecided."""
+    return [each is not False for each in seen]
+
+
+def _most_visible_range(seen: Sequence[bool | None], none: tuple[int, int]) -> tuple[int, int]:
+    """Return, of all ranges around a visible view, the one with the most visible views, or `none`."""
+    ranges = {_visible_range(_not_gone(seen), at) for at, each in enumerate(seen) if each}
+    return max(ranges, key=lambda one: (seen[one[0] : one[1] + 1].count(True), -one[0]), default=none)
 
 
 def _visible_range(there: Sequence[bool], middle: int) -> tuple[int, int]:
