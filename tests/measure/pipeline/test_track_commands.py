@@ -4,13 +4,18 @@ import json
 
 import numpy as np
 import pytest
-from planted_run import LARGEST, SMALL, SMALL_GHOSTS, write_small
+from planted_run import LARGEST, SMALL, SMALL_GHOSTS, rough_model, views, write_small
 from test_prune import model_of
 
 from flarewright.cli.app import run as command
 from flarewright.cli.measure.report import _of_another_model
 from flarewright.io.measurement.ghost_model_file import read_ghost_model, read_ghost_tracks, write_ghost_model
 from flarewright.measure.compression.prune import count_parameters
+from flarewright.measure.fitting.alternating_fit import to_model
+from flarewright.measure.fitting.detected_ghost import DetectedGhost
+from flarewright.measure.pipeline.compress_stage import compress_ghosts
+from flarewright.measure.pipeline.track_stage import track_ghosts
+from flarewright.measure.replay.model_image import replay_model
 from flarewright.model.measurement.ghost_model import BezierGhost
 
 pytestmark = pytest.mark.usefixtures("no_crescents")
@@ -29,6 +34,26 @@ def written(folder, count, names, angles=ANGLES):
 @pytest.fixture
 def folder(tmp_path):
     return written(tmp_path, 2, "ab")
+
+
+def test_a_path_on_both_sides_of_the_axis_is_a_ghost_on_each(tmp_path):
+    """Both have one shape, so that no frame tells them apart: one of them was dropped, and the other drawn wrong."""
+    angles = np.array([-24.0, -19.0, -14.0, -10.0, 9.0, 13.0, 18.0, 23.0])
+    run, middle = write_small(tmp_path, angles=angles), len(angles) // 2
+    one = (SMALL_GHOSTS[0],) * 3
+    seen, beside = views(SMALL_GHOSTS[:1], angles=angles, size=SMALL), rough_model(run)
+    sides = DetectedGhost(one, 0, middle - 1), DetectedGhost(one, middle, len(angles) - 1)
+    model = beside.replace(ghosts=to_model(sides, seen))
+    tracks = track_ghosts(tmp_path, run, model)
+    lives = [
+        [(life.birth.constellation_deg, life.death.constellation_deg) for life in one.lives] for one in tracks.ghosts
+    ]
+    assert [[(-24.0, pytest.approx(-0.5))], [(pytest.approx(-0.5), 23.0)]] == lives
+    small = compress_ghosts(tmp_path, run, model, tracks, residual=False)
+    assert len(small.ghosts) == 2
+    for view in views(SMALL_GHOSTS[:1], angles=angles, size=SMALL, noise=0.0):
+        drawn = replay_model(small, view.constellation_deg)[0].pixels
+        assert np.sqrt(((drawn - view.pixels) ** 2).mean()) < 0.02 * np.sqrt((view.pixels**2).mean())
 
 
 def test_track_and_compress_write_small_files_and_keep_them(folder, capsys):

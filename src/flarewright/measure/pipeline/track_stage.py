@@ -62,9 +62,12 @@ def track_ghosts(
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         views = subtract_glow(read_views(folder, run, every, pool), model.halo, model.star, pool, settings.glow)
         small = map_batched(partial(halved_view, times=times), views, pool=pool)
-    ghosts = [_shapes(ghost, 0.5**times) for ghost in checked_ghosts(model)]
+    known = checked_ghosts(model)
+    ghosts, spans = [_shapes(ghost, 0.5**times) for ghost in known], [_shown(ghost) for ghost in known]
     names, how = [ghost.name for ghost in model.ghosts], settings.tracking
-    tracks = follow(names, ghosts, small, threads=threads, progress=progress, journal=journal, settings=how)
+    tracks = follow(
+        names, ghosts, small, spans=spans, threads=threads, progress=progress, journal=journal, settings=how
+    )
     return tracks if times == 0 else _enlarged(tracks, 2.0**times)
 
 
@@ -93,6 +96,12 @@ def _shapes(ghost: AberrationGhost, factor: float) -> Shapes:
         rescaled(Shape(channel_numbers(each, ghost.blades), len(each.discs)), factor) for each in colours
     )
     return red, green, blue
+
+
+def _shown(ghost: AberrationGhost) -> tuple[float, float]:
+    """Return the first and the last constellation at which all light of a ghost is there."""
+    (low, high), (rise, fall) = ghost.visible_deg, ghost.fade_deg
+    return round(low + 0.5 * rise, 6), round(high - 0.5 * fall, 6)
 
 
 def _enlarged(tracks: Tracks, factor: float) -> Tracks:

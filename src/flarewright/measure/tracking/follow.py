@@ -20,7 +20,7 @@ from ..core.checkpoint import Journal
 from ..core.parallel import done_by
 from ..core.pose_curves import Pose
 from ..core.views import View
-from .frame_fit import Measured, Shapes, measure_together
+from .frame_fit import Measured, Shapes, measure_some
 from .settings import TrackingSettings
 
 # for each ghost, its latest constellations and poses
@@ -28,7 +28,8 @@ _History = list[list[tuple[float, Pose]]]
 
 
 def follow(
-    names: Sequence[str], ghosts: Sequence[Shapes], views: Sequence[View], *, threads: int | None = None,
+    names: Sequence[str], ghosts: Sequence[Shapes], views: Sequence[View], *,
+    spans: Sequence[tuple[float, float]] = (), threads: int | None = None,
     progress: Progress = lambda _part, _words: None, journal: Journal | None = None,
     settings: TrackingSettings = TrackingSettings(),
 ) -> Tracks:  # fmt: skip
@@ -41,6 +42,9 @@ def follow(
         Red, green, blue.
     views : sequence of View
         In order of rising constellation, with halo and star subtracted.
+    spans : sequence of tuple of float
+        First and last constellation at which the fit shows each ghost; empty: unknown. A path that lights only away
+        from the axis is a ghost on each side, both of one shape: a frame of the other side is not measured.
     threads : int, optional
         None: two, one per direction; the tracks do not depend on it.
     progress : callable
@@ -66,9 +70,9 @@ def follow(
 
     def measure(k: int, past: _History) -> Measured:
         view = views[k]
-        return measure_together(
-            ghosts, [_predicted(one, view.constellation_deg, settings) for one in past], view, settings=settings.frame
-        )
+        some = [g for g in range(len(ghosts)) if not spans or not _is_beyond_axis(spans[g], view.constellation_deg)]
+        poses = [_predicted(one, view.constellation_deg, settings) for one in past]
+        return measure_some(ghosts, some, poses, view, settings=settings.frame)
 
     with ThreadPoolExecutor(min(threads or 2, 2)) as pool:
         for done, places in enumerate(zip(order, order[::-1], strict=True)):
@@ -88,6 +92,12 @@ def follow(
         )
         tracks.append(GhostTrack(name=name, lives=lives(of_ghost, settings), steps=of_ghost))
     return Tracks(ghosts=tuple(tracks))
+
+
+def _is_beyond_axis(span_deg: tuple[float, float], constellation_deg: float) -> bool:
+    """Return whether a constellation lies on the other side of the axis than a whole range."""
+    low, high = span_deg
+    return low >= 0.0 > constellation_deg or high <= 0.0 < constellation_deg
 
 
 def _predicted(past: Sequence[tuple[float, Pose]], constellation_deg: float, settings: TrackingSettings) -> Pose:

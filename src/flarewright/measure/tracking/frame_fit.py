@@ -77,6 +77,30 @@ class _Drawn:
     windows: Indices
 
 
+def measure_some(
+    ghosts: Sequence[Shapes], some: Sequence[int], expected: Sequence[Pose], view: View,
+    settings: FrameFitSettings = FrameFitSettings(),
+) -> Measured:  # fmt: skip
+    """Fit the poses of some ghosts in one view, as `measure_together`; the view determines nothing of the others.
+
+    Parameters
+    ----------
+    ghosts : sequence of tuple of Shape
+    some : sequence of int
+        Indices of the ghosts that the view can show.
+    expected, view, settings
+        As for `measure_together`.
+    """
+    found = measure_together([ghosts[g] for g in some], [expected[g] for g in some], view, settings)
+    poses, chosen = list(expected), list(some)
+    for g, pose in zip(chosen, found.poses, strict=True):
+        poses[g] = pose
+    error, crossing = np.full((len(ghosts), PER_GHOST), np.inf), np.ones(len(ghosts))
+    inside = np.array([_inside(shapes[1], pose, view) for shapes, pose in zip(ghosts, poses, strict=True)])
+    error[chosen], crossing[chosen] = found.error, found.crossing
+    return Measured(tuple(poses), error, crossing, inside, found.cost)
+
+
 def measure_together(
     ghosts: Sequence[Shapes], expected: Sequence[Pose], view: View, settings: FrameFitSettings = FrameFitSettings()
 ) -> Measured:
