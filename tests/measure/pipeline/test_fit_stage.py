@@ -138,6 +138,7 @@ def test_a_fit_does_not_detect_a_removed_ghost_again(tmp_path):
     assert both == pytest.approx([-55.0, SPEED], abs=1.0)
     planted = SMALL_GHOSTS[:2] if rough.ghosts[0].green.f[0] < 0.0 else SMALL_GHOSTS[1::-1]
     assert [ghost.green.f[0] for ghost in model.ghosts] == pytest.approx([planted[0].numbers[0]], abs=1.0)
+    assert [ghost.green.f[0] for ghost in model.removed] == pytest.approx([planted[1].numbers[0]], abs=1.0)
     # the frames still contain its light, so a replay does too
     angle = float(SMALL_ANGLES[2])
     (bare,) = views((), angles=[angle], size=SMALL)

@@ -4,13 +4,14 @@ import json
 
 import numpy as np
 import pytest
-from planted_run import LARGEST, SMALL, SMALL_GHOSTS, rough_model, views, write_small
+from planted_run import LARGEST, SMALL, SMALL_GHOSTS, rough_model, shape, views, write_small
 from test_prune import model_of
 
 from flarewright.cli.app import run as command
 from flarewright.cli.measure.report import _of_another_model
 from flarewright.io.measurement.ghost_model_file import read_ghost_model, read_ghost_tracks, write_ghost_model
 from flarewright.measure.compression.prune import count_parameters
+from flarewright.measure.core.parameters import rescaled
 from flarewright.measure.fitting.alternating_fit import to_model
 from flarewright.measure.fitting.detected_ghost import DetectedGhost
 from flarewright.measure.pipeline.compress_stage import compress_ghosts
@@ -34,6 +35,22 @@ def written(folder, count, names, angles=ANGLES):
 @pytest.fixture
 def folder(tmp_path):
     return written(tmp_path, 2, "ab")
+
+
+def test_a_ghost_under_a_removed_one_is_tracked_and_kept(tmp_path):
+    """The light of the removed ghost hid the other one from the tracks, so that the compact model lacked it."""
+    planted = rescaled(shape(-110.0, 22.0, 0.4, bend=8.0), 0.5), rescaled(shape(-120.0, 30.0, 1.0), 0.5)
+    angles = np.linspace(2.0, LARGEST, 6)
+    run = write_small(tmp_path, planted, angles=angles)
+    both = rough_model(run, planted)
+    model = both.replace(ghosts=both.ghosts[:1], removed=both.ghosts[1:])
+    tracks = track_ghosts(tmp_path, run, model)
+    assert [len(one.lives) for one in tracks.ghosts] == [1]
+    small = compress_ghosts(tmp_path, run, model, tracks, residual=False)
+    assert small.removed == model.removed
+    for view in views(planted[:1], angles=angles[1::2], size=SMALL, noise=0.0):
+        drawn = replay_model(small, view.constellation_deg)[0].pixels
+        assert np.sqrt(((drawn - view.pixels) ** 2).mean()) < 0.1 * np.sqrt((view.pixels**2).mean())
 
 
 def test_a_path_on_both_sides_of_the_axis_is_a_ghost_on_each(tmp_path):

@@ -16,6 +16,7 @@ from ..core.checkpoint import Journal
 from ..core.frame_reading import read_views
 from ..glow.subtraction import subtract_glow
 from ..residual.learn import with_residual
+from .removed_light import without_removed
 from .settings import MeasureSettings
 from .track_stage import check_size, checked_ghosts
 
@@ -59,6 +60,7 @@ def compress_ghosts(
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         views = read_views(folder, run, every, pool)
         dim = subtract_glow(views, model.halo, model.star, pool, settings.glow)
+        dim = without_removed(dim, model, settings.fit.model_error, pool)
     small = compact_model(
         model, tracks, dim, threads=threads, progress=progress, journal=journal, settings=settings.compression
     )

@@ -103,7 +103,10 @@ def fit_ghosts(
             )  # fmt: skip
         dim = fit_and_subtract_glow(settled, views, dim.star, pool, settings.glow)
     wanted = without_glow(settled, views, settings.glow.rejection)
-    model = model_of_run(run, to_model(wanted, views), dim, views)
+    # later stages account for the light of what the user removed, too
+    removed = [ghost for ghost in settled if ghost.unwanted and not ghost.glow]
+    known = to_model([*wanted, *removed], views)
+    model = model_of_run(run, known[: len(wanted)], dim, views).replace(removed=known[len(wanted) :])
     return with_residual(model, views, threads, journal) if residual else model
 
 

@@ -21,6 +21,7 @@ from ..core.views import halved_view
 from ..glow.subtraction import subtract_glow
 from ..tracking.follow import follow
 from ..tracking.frame_fit import Shapes, frame_halvings
+from .removed_light import without_removed
 from .settings import MeasureSettings
 
 
@@ -61,6 +62,7 @@ def track_ghosts(
     times = frame_halvings(run.size_px[0], settings.tracking.frame)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         views = subtract_glow(read_views(folder, run, every, pool), model.halo, model.star, pool, settings.glow)
+        views = without_removed(views, model, settings.fit.model_error, pool)
         small = map_batched(partial(halved_view, times=times), views, pool=pool)
     known = checked_ghosts(model)
     ghosts, spans = [_shapes(ghost, 0.5**times) for ghost in known], [_shown(ghost) for ghost in known]

@@ -343,8 +343,8 @@ class GhostModel(Frozen):
         Range that was measured.
     ghosts : tuple of AberrationGhost or BezierGhost
     removed : tuple of AberrationGhost or BezierGhost
-        Ghosts that the user rejected, or that the fit attributes to halo and star near the light. A fit still accounts
-        for their light; nothing draws them.
+        Ghosts that the user rejected, or that the search attributes to halo and star near the light. Later stages still
+        account for their light; nothing draws them.
     halo : Halo or None
     star : Star or None
     sprites : tuple of Sprite
