@@ -71,6 +71,15 @@ def test_tone_curves_are_those_of_their_standards(bits):
     assert codes(light * 9.0, "gamma:2.2", bits).max() == top
 
 
+def test_light_beyond_white_has_the_same_colour_in_8_bits_and_in_16_and_through_every_curve():
+    """A layer of flare has such light; 8 bits of sRGB used to mix it with white, unlike the flared picture."""
+    light = np.array([[[3.0, 0.5, 0.1], [0.5, 0.4, -0.2], [5.0, 4.0, 3.0]]], np.float32)
+    clipped = np.clip(light, 0.0, 1.0)
+    for tone in ("srgb", "linear", "gamma:2.2"):
+        np.testing.assert_array_equal(codes(light, tone, 8), codes(clipped, tone, 8))
+        np.testing.assert_allclose(codes(light, tone, 8), codes(light, tone, 16) / 257.0, atol=0.51)
+
+
 def test_jpeg_changes_a_picture_more_at_lower_quality():
     picture = np.random.default_rng(6).integers(0, 255, (32, 32, 3), np.uint8)
     errors = [np.abs(through_jpeg(picture, quality).astype(int) - picture).mean() for quality in (30, 80, 100)]

@@ -77,7 +77,7 @@ def _row(spec: DatasetSpec, index: int, backgrounds: Sequence[str], threads: int
     light, tone = drawn.linear, drawn.sensor.tone
     flare = light["starburst"] + light["ghosts"] + light["veil"]
     pictures = (
-        *(codes(np.clip(picture, 0.0, 1.0), tone, 8) for picture in (light["flared"], light["clean"], flare)),
+        *(codes(picture, tone, 8) for picture in (light["flared"], light["clean"], flare)),
         _coloured(drawn),
     )
     record = drawn.record

@@ -106,7 +106,7 @@ def codes(linear: Pixels, tone: str, bits: int) -> NDArray[Any]:
     Parameters
     ----------
     linear : ndarray, shape (H, W, 3), float32
-        From `exposed`.
+        Light; each channel is clipped at black and white, as `exposed` clips it.
     tone : str
         "srgb", "linear" or "gamma:2.2".
     bits : int
@@ -117,9 +117,10 @@ def codes(linear: Pixels, tone: str, bits: int) -> NDArray[Any]:
     ndarray, shape (H, W, 3), uint8 or uint16
     """
     gamma = tone_gamma(tone)
-    if gamma is None and bits == 8:
-        return view(linear, 0.0, "srgb")
+    # the view would mix colours beyond white and outside the primaries with white, and 16 bits would not
     light = np.clip(linear, 0.0, 1.0)
+    if gamma is None and bits == 8:
+        return view(light, 0.0, "srgb")
     if gamma is None:
         light = srgb_oetf(light.astype(np.float64)).astype(np.float32)
     elif gamma != 1.0:
