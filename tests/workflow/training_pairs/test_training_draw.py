@@ -128,3 +128,21 @@ def test_stops_that_lead_beyond_the_largest_f_number_are_refused_before_the_work
     check_lenses(spec_of(lens={"names": "heliar-tronnier", "stops_down": {"uniform": [0, 12.3]}}))
     with pytest.raises(ProjectError, match=r"heliar-tronnier: lens.stops_down of 13 from f/3.5 .* give at most 12.3"):
         check_lenses(spec_of(lens={"names": "heliar-tronnier", "stops_down": [0, 13]}))
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "least", "largest"),
+    [
+        ("scatter", "roughness_nm", 0.0, 50.0),
+        ("scatter", "cleanliness_level", 10.0, 2000.0),
+        ("dirt", "dust_per_mm2", 0.0, 200.0),
+        ("dirt", "scratches_per_cm2", 0.0, 1000.0),
+    ],
+)
+def test_a_value_that_no_item_can_have_is_refused_before_the_work(section, key, least, largest):
+    """A roughness of 60 nm passed the checks, and ended the run at the first item that drew it."""
+    for end in (least, largest):
+        assert getattr(getattr(draw_item(spec_of(**{section: {key: end}}), 0).project, section), key) == end
+    for beyond in (least - 0.5, largest + 0.5):
+        with pytest.raises(ValueError, match=f"values lie between {least:g} and {largest:g}"):
+            spec_of(**{section: {key: {"choice": [largest, beyond]}}})

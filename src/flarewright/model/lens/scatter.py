@@ -10,10 +10,15 @@ from ..base import Frozen
 
 ScatterModel = Literal["none", "chaumond", "harvey-shack", "abg"]
 
-Roughness = Annotated[float, Field(ge=0.0, le=50.0)]
+LARGEST_ROUGHNESS_NM = 50.0
+"""Largest rms roughness of a surface."""
+LEAST_LEVEL, LARGEST_LEVEL = 10.0, 2000.0
+"""Least and largest cleanliness level of IEST-STD-CC1246."""
+
+Roughness = Annotated[float, Field(ge=0.0, le=LARGEST_ROUGHNESS_NM)]
 Correlation = Annotated[float, Field(ge=0.5, le=10000.0)]
 Slope = Annotated[float, Field(ge=2.05, le=8.0)]
-Level = Annotated[float, Field(ge=10.0, le=2000.0)]
+Level = Annotated[float, Field(ge=LEAST_LEVEL, le=LARGEST_LEVEL)]
 Share = Annotated[float, Field(ge=0.0, le=0.2)]
 Abg = tuple[
     Annotated[float, Field(ge=0.0, le=10.0)],

@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field, StrictBool, field_validator
 
 from ..base import Frozen
 from ..lens.prescription import LARGEST_F_NUMBER, LEAST_F_NUMBER
+from ..lens.scatter import LARGEST_LEVEL, LARGEST_ROUGHNESS_NM, LEAST_LEVEL
 from .distribution import Constant, Distribution, Integers, LogUniform, TextChoice, Texts, Uniform, within
 
 Part = Literal["clean", "flared", "ghosts", "starburst", "veil", "light_mask", "ghost_mask"]
@@ -115,8 +116,8 @@ class ScatterDraws(Frozen):
         Dust on the surfaces by IEST-STD-CC1246; None: clean.
     """
 
-    roughness_nm: Annotated[Distribution, AfterValidator(within(0.0, 100.0))] = Constant(constant=1.0)
-    cleanliness_level: Annotated[Distribution, AfterValidator(within(1.0, 1000.0))] | None = None
+    roughness_nm: Annotated[Distribution, AfterValidator(within(0.0, LARGEST_ROUGHNESS_NM))] = Constant(constant=1.0)
+    cleanliness_level: Annotated[Distribution, AfterValidator(within(LEAST_LEVEL, LARGEST_LEVEL))] | None = None
 
 
 class InFrame(Frozen):
