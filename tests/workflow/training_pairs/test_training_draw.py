@@ -9,7 +9,9 @@ from flarewright.errors import ProjectError
 from flarewright.io.lens.lens_writer import write_lens
 from flarewright.model.project.dataset import DatasetSpec
 from flarewright.model.project.distribution import Choice, Integers, LogUniform, Normal, TextChoice, Uniform
+from flarewright.render.scene.pixel_place import image_px
 from flarewright.render.scene.resolve import open_lens
+from flarewright.workflow.plates.plate_frame import plate_images
 from flarewright.workflow.training_pairs.draw import (
     check_lenses,
     draw_item,
@@ -101,6 +103,19 @@ def test_places_fill_the_frame_and_its_margin():
     assert 0.9 < np.abs(places).max() <= 1.0001
     inside = (np.abs(places) < 0.5).all(axis=1).mean()
     assert abs(inside - 0.25) < 4.0 * np.sqrt(0.25 * 0.75 / len(lights))
+
+
+@pytest.mark.parametrize("focus_distance", [None, 500.0])
+def test_lights_lie_inside_the_frame_at_a_near_focus_too(focus_distance):
+    """Focused at half a metre, a sensor 25 mm behind the focus showed a third of the lights outside its frame."""
+    lens = {"names": "heliar-tronnier"} | ({} if focus_distance is None else {"focus_distance": focus_distance})
+    spec = spec_of(lens=lens, lights={"count": 16})
+    projects = [draw_item(spec, index).project for index in range(3)]
+    images = plate_images(projects[0])
+    places = [image_px(images, light.field_deg) for project in projects for light in project.lights]
+    parts = np.array(places) / spec.size_px
+    assert 0.0 <= parts.min() <= 0.05
+    assert 0.95 <= parts.max() <= 1.0
 
 
 def test_splits_share_out_lenses_and_every_split_has_one():

@@ -121,7 +121,7 @@ class ScatterDraws(Frozen):
 
 
 class InFrame(Frozen):
-    """A light anywhere in the picture, or around it.
+    """A light anywhere in the picture, or around it, but for the distortion of the lens.
 
     Attributes
     ----------

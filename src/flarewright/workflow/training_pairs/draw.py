@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import floor, log2, pi
+from math import floor, isfinite, log2, pi
 
 import numpy as np
 
@@ -23,8 +23,8 @@ from ...model.project.distribution import (
     TextChoice,
     Uniform,
 )
-from ...optics.lens.paraxial import focal_lengths
-from ...render.scene.resolve import open_lens, resolve_project
+from ...optics.lens.paraxial import focal_lengths, vertex_positions
+from ...render.scene.resolve import ResolvedProject, open_lens, resolve_project
 
 # draft colours need three wavelengths, final ones seven
 _WAVELENGTHS = {"draft": 3, "final": 7}
@@ -156,7 +156,7 @@ def draw_item(spec: DatasetSpec, index: int) -> Drawn:
     )
     settled = resolve_project(project)
     f_number, opened = _f_number(spec.lens, settled.lens.f_number, rng)
-    lights = _lights(spec, index, focal_lengths(settled.order.efl, settled.order.efl_x), project.camera.sensor)
+    lights = _lights(spec, index, _image_distances(settled), project.camera.sensor)
     exposure = draw_number(spec.exposure.stops, stream(spec, index, EXPOSURE))
     return Drawn(project.replace(f_number=f_number, lights=lights), coating, exposure, opened)
 
@@ -234,8 +234,22 @@ def _f_number(draws: LensDraws, widest: float, rng: np.random.Generator) -> tupl
     return max(drawn, widest), drawn < widest
 
 
+def _image_distances(settled: ResolvedProject) -> tuple[float, float]:
+    """Return the places of direct images over the tangents of the field angles near the axis, across and down, mm.
+
+    Focused far away, these are the focal lengths. A sensor behind the focus meets the chief rays, which come from the
+    middle of the exit pupil, farther out.
+    """
+    order = settled.order
+    last = float(vertex_positions(settled.lens)[-1])
+    from_pupil = last - order.exit_pupil_z
+    grown = (from_pupil + order.sensor_distance) / (from_pupil + order.bfl) if isfinite(from_pupil) else 1.0
+    across, down = focal_lengths(order.efl, order.efl_x)
+    return across * grown, down * grown
+
+
 def _lights(
-    spec: DatasetSpec, index: int, efl: tuple[float, float], sensor_mm: tuple[float, float]
+    spec: DatasetSpec, index: int, distances: tuple[float, float], sensor_mm: tuple[float, float]
 ) -> tuple[Light, ...]:
     """Return the lights; without one, a dark light on the axis, since a project needs one."""
     rng, draws = stream(spec, index, LIGHTS), spec.lights
@@ -246,8 +260,8 @@ def _lights(
         else:
             reach = 0.5 + draws.place.margin
             place_mm = rng.uniform(-reach, reach, 2) * sensor_mm
-            # places near (efl tan X, efl tan Y)
-            x, y = np.degrees(np.arctan(place_mm / np.array(efl)))
+            # without the lens' distortion
+            x, y = np.degrees(np.arctan(place_mm / np.array(distances)))
             field = (float(x), float(y))
         found.append(
             Light(
