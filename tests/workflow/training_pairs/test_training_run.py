@@ -249,6 +249,9 @@ def test_backgrounds_are_crops_of_a_folder(tmp_path):
         list_backgrounds(spec_of(background={"folder": str(tmp_path / "empty")}))
     with pytest.raises(ProjectError, match="there is no folder"):
         list_backgrounds(spec_of(background={"folder": str(tmp_path / "none")}))
+    (tmp_path / "empty" / "gone.png").symlink_to(tmp_path / "nowhere.png")
+    with pytest.raises(ProjectError, match=r"gone\.png is a link that leads to no file"):
+        run.plan_of(spec_of(background={"folder": str(tmp_path / "empty")}), tmp_path / "pairs")
     (tmp_path / "a.npy").write_bytes(b"no array")
     with pytest.raises(FlarewrightError, match=r"background a\.npy: "):
         background_of(spec, 12, ("a.npy",))

@@ -38,7 +38,7 @@ def list_backgrounds(spec: DatasetSpec) -> tuple[str, ...]:
     Raises
     ------
     ProjectError
-        There is no such folder, or it holds no pictures.
+        There is no such folder, it holds no pictures, or a link in it leads to no file.
     """
     if spec.background.folder is None:
         return ()
@@ -55,6 +55,9 @@ def list_backgrounds(spec: DatasetSpec) -> tuple[str, ...]:
         ]
     if not found:
         raise ProjectError(f"background.folder: {folder} holds no pictures ({', '.join(SUFFIXES)}); choose another one")
+    lost = next((name for name in found if not os.path.isfile(folder / name)), None)
+    if lost is not None:
+        raise ProjectError(f"background.folder: {lost[:120]} is a link that leads to no file; mend or remove it")
     return tuple(sorted(found))
 
 
