@@ -257,6 +257,14 @@ def test_backgrounds_are_crops_of_a_folder(tmp_path):
         background_of(spec, 12, ("a.npy",))
 
 
+@pytest.mark.parametrize(("side", "size"), [(28, 100), (21, 300), (29, 360)])
+def test_the_largest_crop_is_the_whole_picture(tmp_path, side, size):
+    """Its sides were an ulp longer than the picture, and Pillow refused the corner beyond it."""
+    np.save(tmp_path / "a.npy", np.ones((side, side, 3), np.float32))
+    spec = spec_of(background={"folder": str(tmp_path), "crop": 1.0}, size_px=(size, size))
+    assert background_of(spec, 0, ("a.npy",))[1]["crop"] == [0.0, 0.0, side, side]
+
+
 def test_the_layout_of_flare7k(tmp_path):
     spec = spec_of(
         layout="flare7k", lens={"names": LENSES}, splits={"train": [LENSES[0]], "test": [LENSES[1]]}, sensor={}, seed=1,

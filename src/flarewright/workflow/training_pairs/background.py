@@ -115,7 +115,8 @@ def _crop_box(
     """Return the left, upper, right and lower edge of a random crop with the item's proportions."""
     high, wide = shape
     scale = part * min(wide / size_px[0], high / size_px[1])
-    across, down = scale * size_px[0], scale * size_px[1]
+    # rounding must not leave the picture
+    across, down = min(wide, scale * size_px[0]), min(high, scale * size_px[1])
     left, top = rng.random() * (wide - across), rng.random() * (high - down)
     return float(left), float(top), float(left + across), float(top + down)
 
