@@ -85,6 +85,18 @@ def test_lights_are_where_the_camera_of_usd_projects_them(stage):
     assert all(word in remarks for word in ("'behind' is never in front", "sky have no place", "intensities of flash"))
 
 
+def test_a_light_whose_colour_passes_through_black_keeps_its_colours_and_is_off_there(stage):
+    """One black frame made the light white in all frames, and lit in the black one."""
+    made, file, (usd, _geom, gf, _) = stage
+    colour = made.GetPrimAtPath("/lamp").GetAttribute("inputs:color")
+    for frame, value in ((1001, (1.0, 0.2, 0.1)), (1002, (0.0, 0.0, 0.0)), (1003, (0.1, 0.2, 1.0))):
+        colour.Set(gf.Vec3f(*value), usd.TimeCode(frame))
+    made.GetRootLayer().Save()
+    lamp = next(track for track in read_tracks(file).tracks if track.name == "lamp")
+    assert lamp.hidden.tolist() == [False, True, False]
+    np.testing.assert_allclose(lamp.rgb, [[1.0, 0.2, 0.1], [1.0, 0.2, 0.1], [0.1, 0.2, 1.0]])
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -137,21 +137,26 @@ def _light(prim: Any, frames: tuple[float, ...], geom: Any, lux: Any, usd: Any) 
         radius = float(prim.GetAttribute("inputs:radius").Get() or 0.0)
     states = []
     api = lux.LightAPI(prim)
-    for frame in frames:
+    colours = [_colour(api, usd.TimeCode(frame)) for frame in frames]
+    lit = next((colour for colour in colours if colour is not None and max(colour) > 0.0), None)
+    for frame, colour in zip(frames, colours, strict=True):
         time = usd.TimeCode(frame)
         level = float(api.GetIntensityAttr().Get(time) or 0.0)
         seen = geom.Imageable(prim).ComputeVisibility(time) != geom.Tokens.invisible
-        # units of USD say nothing about the irradiance at the camera, but a light of 0 is off
+        # units of USD say nothing about the irradiance at the camera, but a light of 0 is off, and so is a black one,
+        # which keeps the colour of a frame beside it
+        black = colour is not None and max(colour) <= 0.0
+        lit = lit if black else colour
         matrix = _matrix(prim, frame, geom, usd)
-        states.append(LightFrame(frame, matrix, None, _colour(api, time), seen and level > 0.0))
+        states.append(LightFrame(frame, matrix, None, lit, seen and level > 0.0 and not black))
     return SceneLight(str(prim.GetName()), distant, tuple(states), angle, radius)
 
 
 def _colour(api: Any, time: Any) -> tuple[float, float, float] | None:
-    """Return the colour of a light; None for white, which keeps the light's own spectrum."""
+    """Return the colour of a light, which may be black; None for white, which keeps the light's own spectrum."""
     attribute = api.GetColorAttr()
     value = attribute.Get(time)
     if value is None or not attribute.HasAuthoredValue():
         return None
     red, green, blue = (max(float(part), 0.0) for part in value)
-    return (red, green, blue) if max(red, green, blue) > 0.0 else None
+    return red, green, blue
