@@ -111,6 +111,24 @@ def test_a_scene_of_blender_gives_the_pinhole_projection(read):
     assert ["'behind' is never in front" in line for line in found.remarks] == [True]
 
 
+@pytest.mark.parametrize("key", ["intensity", "rgb"])
+def test_a_value_in_some_frames_of_a_light_only_is_refused(read, key):
+    """It was dropped for all frames without a word."""
+    eye = np.eye(4).tolist()
+    lamp = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -5], [0, 0, 0, 1]]
+    value = {"intensity": 0.5, "rgb": [1, 0.5, 0.2]}[key]
+    states = [{"frame": 1, "matrix": lamp, key: value}, {"frame": 2, "matrix": lamp}]
+    scene = {
+        "format": "flarewright-scene", "version": 1,
+        "camera": {"frames": [{"frame": 1, "matrix": eye, "focal_mm": 50.0, "sensor_mm": [36.0, 20.0]}]},
+        "lights": [{"name": "lamp", "kind": "point", "frames": states}],
+    }  # fmt: skip
+    with pytest.raises(FileError, match=f"the light 'lamp' has {key} in some frames only; give it in all of them"):
+        read(json.dumps(scene))
+    states[1][key] = value
+    assert getattr(read(json.dumps(scene)).tracks[0], key).shape[0] == 2
+
+
 def test_the_example_of_the_documentation_can_be_read(read):
     text = (Path(__file__).parents[3] / "docs" / "placing-lights.md").read_text("utf-8")
     (sun,) = read(text.partition("```json")[2].partition("```")[0]).tracks

@@ -83,7 +83,8 @@ def read_scene(text: str, file: str) -> TrackFile:
     Raises
     ------
     FileError
-        It is no scene, a value is out of range, or no light is in front of the camera.
+        It is no scene, a value is out of range or stands in some frames of a light only, or no light is in front of
+        the camera.
     """
     name = shown(file)
     try:
@@ -100,6 +101,12 @@ def read_scene(text: str, file: str) -> TrackFile:
         CameraFrame(one.frame, _matrix(one, name), one.focal_mm, one.sensor_mm, one.axis)
         for one in _ordered(scene.camera.frames, f"{name}: the camera")
     )
+    for light in scene.lights:
+        for key in ("intensity", "rgb"):
+            if len({getattr(one, key) is None for one in light.frames}) > 1:
+                raise FileError(
+                    f"{name}: the light {light.name!r} has {key} in some frames only; give it in all of them or none"
+                )
     lights = tuple(
         SceneLight(
             light.name, light.kind == "sun",
