@@ -13,9 +13,12 @@ from PIL import Image
 from flarewright import Camera, Light, Output, Project, Quality, shot
 from flarewright.errors import FlarewrightError
 from flarewright.io.images.exr import read_exr
+from flarewright.io.lens.lens_writer import write_lens
+from flarewright.io.project.project_file import read_project
 from flarewright.model import Holdout, ProjectCurve
 from flarewright.plates.settings import PlateSettings
 from flarewright.render.remarks import DARK
+from flarewright.render.scene.resolve import open_lens
 from flarewright.workflow.plates.plate_files import plate_frames
 from flarewright.workflow.plates.plate_frame import alike_lights
 from flarewright.workflow.plates.plate_sources import plate_shot, sources_file
@@ -151,6 +154,17 @@ def test_own_lights_stay_and_the_plates_lights_come_in_addition(plates, tmp_path
     assert result.frames[0].drawn
     assert "own" in read_exr(tmp_path / "f.1001.exr").metadata["project"]
     assert read_exr(tmp_path / "f.1001.exr").metadata["project"].count("[[lights]]") == 2
+
+
+def test_the_project_in_a_comp_starts_at_the_folder_of_the_comp(plates, tmp_path, monkeypatch):
+    """In another folder than the flare's it named a lens that does not exist."""
+    monkeypatch.chdir(tmp_path)
+    write_lens(open_lens("heliar-tronnier").lens, Path("own.toml"))
+    for name in ("flare", "comps/deep"):
+        Path(name).mkdir(parents=True)
+    draw(plates, Path("flare"), project(lens="own.toml"), frames=[1001], over="comps/deep/c.####.exr")
+    for file in ("flare/f.1001.exr", "comps/deep/c.1001.exr"):
+        assert Path(read_project(file).lens).samefile("own.toml")
 
 
 @pytest.mark.parametrize(

@@ -352,7 +352,9 @@ def _write(plan: ShotPlan, frame: int, moments: tuple[Project, ...], rendering: 
         )
         if plan.plate is not None and plan.over:
             over = FramePattern(plan.over).path(frame)
-            write_comp(over, plan.plate, frame, rendering.layers, project, metadata, attributes)
+            # its project starts at its own folder
+            facts = {**metadata, "project": project_text(shown, folder=over.parent)}
+            write_comp(over, plan.plate, frame, rendering.layers, project, facts, attributes)
 
 
 def _facts(project: Project) -> dict[str, Any]:
