@@ -77,6 +77,18 @@ def test_the_count_follows_the_motion():
     assert subframe_count([at(-15.0), at(0.0), at(15.0)]) == MOST_SUBFRAMES
 
 
+@pytest.mark.parametrize(("lens", "f_number", "first"), [("nikkor-180-ed", 8, 3.0), ("heliar-tronnier", 22, 13.0)])
+def test_a_ghost_that_leaves_the_picture_counts_and_more_time_is_more_motion(lens, f_number, first):
+    """Ghosts that are in the picture at some moments only were left out, and with them half of the sub-frames."""
+    camera = Camera(size_px=(360, 240))
+    moments = [
+        Project(lens=lens, f_number=f_number, lights=[Light(field_deg=(first + step, 0))], camera=camera)
+        for step in (0.0, 0.075, 0.15, 0.225, 0.3)
+    ]
+    half, whole = motion_px(moments[:3]), motion_px(moments)
+    assert whole == pytest.approx(2.0 * half, rel=0.02)
+
+
 def test_a_desqueezed_picture_moves_as_many_pixels_down_as_a_squeezed_one():
     way = []
     for desqueeze in (False, True):

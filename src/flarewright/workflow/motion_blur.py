@@ -92,7 +92,10 @@ def motion_px(projects: Sequence[Project]) -> float:
         return 0.0
     if is_measured(projects[0]):
         return 2.0 * _way([_lights(project) for project in projects])
-    return _way([_ghosts(project) for project in projects])
+    moments = [_ghosts(project) for project in projects]
+    # a ghost that enters or leaves the picture moves all the time
+    seen = set().union(*(names for _, names in moments))
+    return _way([{name: place for name, place in places.items() if name in seen} for places, _ in moments])
 
 
 def _way(moments: Sequence[_Places]) -> float:
@@ -105,23 +108,26 @@ def _way(moments: Sequence[_Places]) -> float:
     return longest
 
 
-def _ghosts(project: Project) -> _Places:
-    """Return places and radii of the ghosts that meet the picture, and of the direct images."""
+def _ghosts(project: Project) -> tuple[_Places, set[tuple[int, str]]]:
+    """Return places and radii of ghosts and of the direct images, and which count: those that meet the picture."""
     settled = resolve_project(project)
     width, height = settled.project.camera.size_px
     paths = [direct_path(settled.lens), *ghost_paths(settled.lens, project.quality.paths)]
     # a mask's pixels do not change places
     opening = make_opening(settled, None)
     found: _Places = {}
+    seen: set[tuple[int, str]] = set()
     for k, shot in enumerate(make_shots(settled, opening)):
         scale = np.abs(shot.to_pixels[2:])
         for number, path in enumerate(paths):
             frame = ghost_frame(shot, path)
             (x, y), radius = np.array(frame.centre) * scale, frame.radius * float(scale.max())
-            inside = max(abs(x) - 0.5 * width, abs(y) - 0.5 * height) < radius
-            if np.isfinite(x + y + radius) and (inside or number == 0):
-                found[k, str(number)] = (float(x), float(y), float(radius))
-    return found
+            if not np.isfinite(x + y + radius):
+                continue
+            found[k, str(number)] = (float(x), float(y), float(radius))
+            if number == 0 or max(abs(x) - 0.5 * width, abs(y) - 0.5 * height) < radius:
+                seen.add((k, str(number)))
+    return found, seen
 
 
 def _lights(project: Project) -> _Places:
