@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def open_project_files(file: Path | str, project: Project) -> ResolvedProject:
-    """Read all files that a project's render reads.
+    """Read all files that a project's render reads, and check its lens at every key of its curves.
 
     Parameters
     ----------
@@ -48,6 +48,7 @@ def open_project_files(file: Path | str, project: Project) -> ResolvedProject:
         lambda: None if mask is None else read_mask(mask),
         lambda: read_soil(project.dirt),
         *(partial(read_plates, project, light) for light in project.lights),
+        *(partial(_check_moment, project, at_s) for at_s in _times(project)),
     ]
     errors: dict[str, FlarewrightError] = {}
     for stage in stages:
@@ -60,3 +61,20 @@ def open_project_files(file: Path | str, project: Project) -> ResolvedProject:
     if errors:
         raise ProjectError(summary(str(file), list(errors)), tuple(errors))
     return settled
+
+
+def _times(project: Project) -> list[float]:
+    """Return the times of the keys of zoom, focus, f-number, iris and gains."""
+    return sorted({at_s for curve in project.curves for at_s in curve.at_s})
+
+
+def _check_moment(project: Project, at_s: float) -> None:
+    """Raise an error for values that the lens cannot have together at a time."""
+    from ..render.scene.resolve import resolve_project
+    from .keyframes import project_at, still
+
+    moment = still(project_at(project, at_s))
+    try:
+        resolve_project(moment)
+    except FlarewrightError as error:
+        raise type(error)(f"at {at_s:g} s: {error}", error.problems) from None
