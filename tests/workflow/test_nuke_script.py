@@ -1,8 +1,10 @@
 """The script for Nuke, parsed and evaluated: with gains of 1 it gives the plate plus the beauty."""
 
 import re
+import shutil
 from dataclasses import dataclass, field
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -202,6 +204,21 @@ def test_frames_rate_and_format_are_those_of_the_files(shot):
     assert parsed(script.text)[0].knobs["fps"] == "25"
     assert script.frames == (1001, 1002)
     assert script.remarks == ()
+
+
+def test_frames_without_a_file_are_remarked_however_they_were_chosen(shot):
+    """With --frames a Read asked for frames of the flare or the plate that do not exist, without a word."""
+    flare, plate = Path(shot), Path(shot).with_name("plate.####.exr")
+    for frame in (1001, 1003):
+        shutil.copyfile(flare.with_name("flare.1001.exr"), plate.with_name(f"plate.{frame}.exr"))
+    chosen = nuke_script(shot, plate=str(plate), frames=(1001, 1002, 1004)).remarks
+    assert [line.partition(" has ")[2] for line in chosen] == [
+        "no frames 1003; Nuke reports an error there", "no frames 1002,1004; Nuke reports an error there",
+    ]  # fmt: skip
+    found = nuke_script(shot, plate=str(plate)).remarks
+    assert [line.partition(" has ")[2] for line in found[1:]] == [
+        "the frames 1001 to 1003 only", "no frames 1002; Nuke reports an error there",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("pattern", ["flare.%04d.exr", "flare.$F4.exr"])

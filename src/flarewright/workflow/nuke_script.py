@@ -117,8 +117,7 @@ def nuke_script(
     contents = read_exr(FramePattern(flare).path(files.first))
     _check_scales(FramePattern(flare), files, contents.scale)
     found, remarks = _passes(contents, singles)
-    if files.missing:
-        remarks.append(f"{flare} has no frames {frames_text(files.missing)[:200]}; Nuke reports an error there")
+    remarks += _missing_words(flare, files)
     layers = (*found.passes, *found.singles)
     rest = ("rest",) if found.singles else ()
     graded = (*(layer for layer in layers if layer != "ghosts" or not rest), *rest) or (BEAUTY,)
@@ -137,6 +136,7 @@ def nuke_script(
         behind = _sequence(plate, None if frames is None else range(files.first, files.last + 1))
         if (behind.first > files.first or behind.last < files.last) and FramePattern(plate).numbered:
             remarks.append(f"{plate} has the frames {behind.first} to {behind.last} only")
+        remarks += _missing_words(plate, behind)
         sum_of_flare = nodes[-1]
         last = sum_of_flare.place[1] + 1
         nodes.append(Node("Read", "Plate", _read_knobs(behind, None), place=(-2, last - 1)))
@@ -167,16 +167,20 @@ def _sequence(text: str, frames: Sequence[int] | None) -> Frames:
     if not wanted & there:
         raise ProjectError(f"{shown(text)} has the frames {frames_text(sorted(there))[:200]}, none of those asked")
     first, last = (min(there), max(there)) if frames is None else (min(wanted), max(wanted))
-    missing = (
-        tuple(frame for frame in range(first, last + 1) if frame not in there)
-        if frames is None
-        else tuple(sorted(wanted - there))
-    )
+    # a Read reads every frame between its first and its last
+    missing = tuple(frame for frame in range(first, last + 1) if frame not in there)
     if first not in there:
         raise ProjectError(f"{shown(str(pattern.path(first)))} does not exist: choose --frames that there are")
     # the number as Nuke writes it
     place = "#" * pattern.digits if pattern.digits > 1 else "%d"
     return Frames(_absolute(Path(pattern.rewritten(place))), first, last, missing)
+
+
+def _missing_words(text: str, files: Frames) -> list[str]:
+    """Return a remark on frames that a Read asks for and that have no file."""
+    if not files.missing:
+        return []
+    return [f"{text} has no frames {frames_text(files.missing)[:200]}; Nuke reports an error there"]
 
 
 def _check_scales(pattern: FramePattern, files: Frames, scale: float) -> None:
