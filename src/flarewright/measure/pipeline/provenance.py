@@ -20,7 +20,7 @@ NOTES = "stages.json"
 _LARGEST = 64_000_000
 _CORRECTIONS = "corrections"
 # increase when the same frames give other ghosts
-_VERSION = 1
+_VERSION = 2
 
 
 def run_digest(folder: Path, run: MergedRun, settings: Mapping[str, object]) -> str:
