@@ -160,6 +160,16 @@ def test_curves_of_a_lens_hold_between_their_samples(to_deg, most):
     np.testing.assert_allclose(check.predicted[:, wanted], check.rendered[:, wanted], rtol=0.12)
 
 
+def test_the_frame_of_an_anamorphic_lens_is_that_of_its_render():
+    """Its width was that of a lens without squeeze, twice too large."""
+    lights = (Light(field_deg=(0.0, 0.0)),)
+    project = Project(lens="anamorphic-heliar-2x", lights=lights, camera=Camera(size_px=(96, 40), desqueeze=True))
+    draft = Quality(mode="draft", wavelengths=3)
+    _, frame = square_flare(project, draft)
+    rendered = render(project.replace(quality=draft, output=Output(starburst=False)))
+    assert [frame.width, frame.height] == rendered.summary["sensor_mm"]
+
+
 def test_a_round_iris_turns_with_the_light_blades_by_steps_and_an_anamorphic_lens_not():
     assert lens_flare(heliar(f_number=8.0, iris={}, quality={"mode": "draft"})).turns_by_deg == 0.0
     assert lens_flare(heliar(f_number=8.0, iris={"blades": 5}, quality={"mode": "draft"})).turns_by_deg == 72.0

@@ -267,6 +267,7 @@ def test_values_are_quoted_so_that_tcl_reads_them_as_text(text):
         ("none.####.exr", {}, "there are no files"),
         ("flare.####.exr", {"frames": (7, 8)}, "none of those asked"),
         ("flare.####.exr", {"frames": (1000, 1001)}, "flare.1000.exr does not exist"),
+        ("flare.####.exr", {"frames": (1001, 10**9)}, "1001 to 1000000000 are more than 1000000 frames"),
         ("flare.####.exr", {"gain": float("nan")}, "the gain nan is no factor above 0"),
         ("flare.####.exr", {"plate": "plate.####.exr"}, "there are no files"),
     ],

@@ -152,7 +152,8 @@ def square_flare(project: Project, quality: Quality, *, threads: int | None = No
         if every roll changes the flare.
     frame : Frame
     """
-    frame = Frame(*project.camera.sensor)
+    # the lens may state a squeeze, on which the width of a sensor depends
+    frame = Frame(*resolve_project(project).project.camera.sensor)
     project = luminous(project, quality.replace(paths=project.quality.paths))
     turned = project.replace(camera=_square(project, frame))
     if _turns_by(resolve_project(turned)) is not None:

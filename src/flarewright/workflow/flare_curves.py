@@ -51,7 +51,7 @@ def flare_curves(
     >>> from flarewright.predict import Wanted
     >>> project = fw.Project(lens="heliar-tronnier", lights=(fw.Light(field_deg=(0, 0)),))
     >>> found = flare_curves(project, Wanted(to_deg=20.0, checks=0), quality="draft")  # doctest: +SKIP
-    >>> found.curves.angles_deg  # doctest: +SKIP
+    >>> found.curves.constellation_deg  # doctest: +SKIP
     """
     from ..predict.occurrence import Wanted, predict_occurrence
     from .flare_pictures import pictures_elsewhere

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import OutputError, ProjectError
 from ..io.files.door import no_file, shown
 from ..io.images.exr import ExrContents, read_exr, scale_in_exr
-from ..jobs.frame_list import FramePattern, frames_text
+from ..jobs.frame_list import MOST_FRAMES, FramePattern, frames_text
 from ..render.image.compose import add_layer
 from .nuke_graph import Node, Passes, flare_nodes, layers_text, nodes_text, quoted
 
@@ -167,6 +167,10 @@ def _sequence(text: str, frames: Sequence[int] | None) -> Frames:
     if not wanted & there:
         raise ProjectError(f"{shown(text)} has the frames {frames_text(sorted(there))[:200]}, none of those asked")
     first, last = (min(there), max(there)) if frames is None else (min(wanted), max(wanted))
+    if last - first >= MOST_FRAMES:
+        raise ProjectError(
+            f"{shown(text)}: {first} to {last} are more than {MOST_FRAMES} frames; choose fewer --frames"
+        )
     # a Read reads every frame between its first and its last
     missing = tuple(frame for frame in range(first, last + 1) if frame not in there)
     if first not in there:

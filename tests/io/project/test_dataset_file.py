@@ -43,8 +43,13 @@ def test_paths_start_at_the_file_and_names_of_the_library_do_not(tmp_path):
         ("stops_down = { log_uniform = [0, 4] }", "starts above 0, not at 0; write uniform instead"),
         ("stops_down = { normal = [1, 0], bounds = [0, 2] }", "a standard deviation of 0 is not above 0"),
         ("stops_down = { normal = [1, 1], bounds = [8, 9] }", "more than three deviations from the mean 1"),
+        (
+            "stops_down = { normal = [1, 1], bounds = [3, 3.000001] }",
+            "the bounds 3 to 3.000001 hold 5e-08 of all values",
+        ),
         ("stops_down = { normal = [1, 1] }", "lens.stops_down.bounds is missing"),
         ("stops_down = { choice = [1, 2], weights = [1] }", "there are 1 weights for 2 choices"),
+        ("stops_down = { choice = [1, 2], weights = [1e308, 1e308] }", "the sum of the weights is too large"),
         ("stops_down = { choice = [1, 2], weights = [0, 0] }", "all weights are 0, so nothing can be drawn"),
         ("stops_down = { gauss = [1, 2] }", "lens.stops_down: a table is no distribution; write a number"),
         ("stops_down = true", "lens.stops_down: true is no distribution"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import erf, isfinite, sqrt
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator
@@ -12,6 +13,9 @@ from ..base import Frozen
 Number = Annotated[float, Field(strict=True)]
 Whole = Annotated[int, Field(strict=True)]
 Weight = Annotated[float, Field(strict=True, ge=0.0)]
+
+# part of a normal distribution that its bounds hold at least
+_LEAST_HELD = 1e-3
 
 _HOW = (
     "write a number, a list of choices, { choice = [...], weights = [...] }, { uniform = [low, high] }, "
@@ -123,6 +127,13 @@ class Normal(Frozen):
                 raise ValueError(
                     f"the bounds {bounds[0]:g} to {bounds[1]:g} are more than three deviations from the mean {mean:g}; "
                     "move them or the mean"
+                )
+            # so would between bounds that almost no value meets
+            below, above = (erf((bound - mean) / (sqrt(2.0) * deviation)) for bound in bounds)
+            if 0.5 * (above - below) < _LEAST_HELD:
+                raise ValueError(
+                    f"the bounds {bounds[0]:.9g} to {bounds[1]:.9g} hold {0.5 * (above - below):.1g} of all values; "
+                    "widen them, or write a single number"
                 )
         return bounds
 
@@ -253,11 +264,13 @@ Texts = Annotated[TextChoice, BeforeValidator(_texts)]
 
 
 def fitting_weights(weights: tuple[float, ...] | None, choices: tuple[Any, ...] | None) -> tuple[float, ...] | None:
-    """Return weights unchanged; raises ValueError unless there is one per choice and one is above 0."""
+    """Return weights unchanged; raises ValueError unless there is one per choice, one above 0, and a finite sum."""
     if weights is None or choices is None:
         return weights
     if len(weights) != len(choices):
         raise ValueError(f"there are {len(weights)} weights for {len(choices)} choices; give one each")
+    if not isfinite(sum(weights)):
+        raise ValueError("the sum of the weights is too large; divide them all by one number")
     if not sum(weights) > 0.0:
         raise ValueError("all weights are 0, so nothing can be drawn; give one above 0")
     return weights
