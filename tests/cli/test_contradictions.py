@@ -120,3 +120,11 @@ def test_a_project_that_cannot_be_rendered_is_not_usable(capsys, folder, lines, 
     (folder / "p.toml").write_text(f'lens = "heliar-tronnier"\n[[lights]]\nfield_deg = [10, 5]\n{lines}')
     assert run(["project", "check", "p.toml"]) == 2
     assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("flag", ["--ringing off", "--ledger", "--profile"])
+def test_a_measured_flare_refuses_flags_for_a_prescription(capsys, folder, flag):
+    (folder / "model.json").write_text("{}")
+    assert run(["render", "model.json", "--light", "5,0", *flag.split(), "-o", "a.exr"]) == 2
+    name = flag.split()[0]
+    assert f"model.json is a measured flare, which has no {name[2:]}; omit {name}" in capsys.readouterr().err

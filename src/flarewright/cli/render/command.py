@@ -325,7 +325,8 @@ def _renderer(
     if is_ghost_model_file(project.lens):
         from ...measure.replay.measured_project import render_measured
 
-        for flag, given in (("--ledger", options.ledger), ("--profile", options.profile)):
+        flags = {"--ledger": options.ledger, "--profile": options.profile, "--ringing": options.ringing is not None}
+        for flag, given in flags.items():
             if given:
                 raise ProjectError(f"{project.lens} is a measured flare, which has no {flag[2:]}; omit {flag}")
         return partial(render_measured, project)
