@@ -109,7 +109,7 @@ const autoExpose = () => (app.state.plate?.lit ? app.setView({ plate_stops: 0 })
 
 // All changes of the project go through one queue, so that the last change wins, and save, undo and search use what
 // the page shows. Values that keep a part of the state (an angle, a side) are a function: it runs when their turn comes,
-// because an earlier change may still be on its way.
+// because an earlier change may still be on its way, and returns null when what it changes is gone.
 const line = inLine();
 app.line = line;
 app.command = async (name, values, group = '', table = null, stroke = '') => {
@@ -117,6 +117,7 @@ app.command = async (name, values, group = '', table = null, stroke = '') => {
   try {
     await line(async () => {
       const given = typeof values === 'function' ? values() : values;
+      if (!given) return;
       const state = await post('api/do', { name, values: given, group, table: typeof table === 'function' ? table() : table });
       hush(about);
       take(state);

@@ -68,18 +68,17 @@ export function pathGroup(app) {
     // the times the key has or was asked to have: an answer may be on its way, and a refused move leaves it in place
     const { light } = app;
     const times = [each.at_s];
-    const number = () => {
-      const now = app.state.lights[light].keys;
-      return times.map((at_s) => now.findIndex((key) => Math.abs(key.at_s - at_s) < HALF_STEP_S)).find((one) => one >= 0) ?? k;
-    };
-    const move = (at_s) => app.command('move_key', () => { const values = { light, number: number(), at_s }; times.push(at_s); return values; });
-    const place = (axis, angle) => app.command('set_key', () => {
-      const key = app.state.lights[light].keys[number()];
-      return { light, at_s: key.at_s, field_deg: key.field_deg.with(axis, angle) };
+    const change = (name, valuesOf) => app.command(name, () => {
+      const now = app.state.lights[light]?.keys ?? [];
+      const number = times.map((at_s) => now.findIndex((key) => Math.abs(key.at_s - at_s) < HALF_STEP_S)).find((one) => one >= 0);
+      return number === undefined ? null : { light, ...valuesOf(now[number], number) };
     });
+    const move = (at_s) => change('move_key', (_, number) => { times.push(at_s); return { number, at_s }; });
+    const place = (axis, angle) => change('set_key', (key) => ({ at_s: key.at_s, field_deg: key.field_deg.with(axis, angle) }));
+    const remove = () => change('remove_key', (_, number) => ({ number })).catch(() => {});
     return h('tr', {}, cell(each.at_s, 'seconds', move),
       cell(each.field_deg[0], 'right', (value) => place(0, value)), cell(each.field_deg[1], 'up', (value) => place(1, value)),
-      h('td', {}, button('×', () => app.command('remove_key', () => ({ light, number: number() })).catch(() => {}), { kind: 'quiet', 'aria-label': `Remove key ${k + 1}` })));
+      h('td', {}, button('×', remove, { kind: 'quiet', 'aria-label': `Remove key ${k + 1}` })));
   }
   function tick() {
     play.textContent = player.playing ? '■ Stop' : '▶ Play';
