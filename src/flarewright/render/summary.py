@@ -13,7 +13,7 @@ from ..kernels.tracing.sequential import REFRACT
 from ..model import Project
 from ..optics.lens.paths import direct_path
 from .scene.art_rules import ResolvedArt
-from .scene.direct_image import DirectImage
+from .scene.direct_image import DirectImage, pattern_stretch
 from .scene.resolve import ResolvedProject
 from .scene.shot import Shot
 
@@ -48,7 +48,8 @@ def _scene_scale(settled: ResolvedProject, shot: Shot) -> float:
     """Irradiance at the sensor's centre per radiance of an extended scene: pi T (r / d)^2 of the exit pupil.
 
     Dividing layers by it gives the unit of the plate (docs/physics.md, "Radiometry"). Focused at infinity, r / d is
-    1 / (2 N); it shrinks as the sensor moves away for a near focus plane.
+    1 / (2 N); it shrinks as the sensor moves away for a near focus plane. Cylinders behind the stop make the exit pupil
+    an ellipse.
     """
     packed = shot.packed
     # rays along the axis meet every surface at normal incidence, the last entry of its table
@@ -56,7 +57,8 @@ def _scene_scale(settled: ResolvedProject, shot: Shot) -> float:
     passed = 1.0 - packed.reflectance[middle, path.rows[path.actions == REFRACT], -1]
     # a mask spans a square; the round opening is pi / 4 of it
     opened = shot.opening.mean_transmittance * (1.0 if shot.opening.mask is None else 4.0 / pi)
-    return float(pi * passed.prod() * opened * (0.5 / shot.working_f_number) ** 2)
+    cone = (0.5 / shot.working_f_number) ** 2 / pattern_stretch(settled.lens, shot)
+    return float(pi * passed.prod() * opened * cone)
 
 
 def _light_summary(project: Project, number: int, parts: list[tuple[Shot, DirectImage]]) -> dict[str, Any]:

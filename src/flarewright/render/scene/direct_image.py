@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import isclose
 
 import numpy as np
 
@@ -118,6 +119,30 @@ def _through_mask(shot: Shot, bundle: Bundle, data: Floats, sums: Floats) -> flo
         bundle.halves,
     )  # fmt: skip
     return float(to_pixels(plane, side)[:, :, 0].sum(dtype=np.float64))
+
+
+def pattern_stretch(lens: Lens, shot: Shot) -> float:
+    """Return the width of the diffraction pattern of a round iris over its height, from matrices.
+
+    Returns
+    -------
+    float
+        1 where both meridians have the same cone of light behind the lens, as with cylinders in front of the stop only.
+
+    Notes
+    -----
+    The cone's f-number in a meridian is B of the way from the stop to the sensor over the stop's diameter
+    (`Shot.working_f_number` in the y-z plane).
+    """
+    packed = shot.packed
+    if packed.curvature_x is None:
+        return 1.0
+    reach = []
+    for across in (True, False):
+        ((stop, *_), *_), total = path_matrices(lens, direct_path(lens), D_LINE_NM, packed.sensor_z, across=across)
+        reach.append(abs(float(total[0, 1] * stop[0] - total[0, 0] * stop[1])))
+    wide, high = reach
+    return 1.0 if isclose(wide, high, rel_tol=1e-9) or min(reach) == 0.0 else wide / high
 
 
 def defocus_mm(lens: Lens, shot: Shot) -> float:

@@ -20,7 +20,7 @@ from ...optics.pupil.polygon import mapped, points
 from ...typing import Floats
 from ..ghosts.extent_blur import extent_coverage, joined_parts, spread_window
 from ..scene.area_lights import motion
-from ..scene.direct_image import PUPIL_SPAN, DirectImage, defocus_mm, traced_pupil, traced_spot
+from ..scene.direct_image import PUPIL_SPAN, DirectImage, defocus_mm, pattern_stretch, traced_pupil, traced_spot
 from ..scene.path_color import direct_flux
 from ..scene.resolve import ResolvedProject
 from ..scene.shot import Shot
@@ -154,8 +154,9 @@ def _many_lights(scene: _Scene, group: list[tuple[Shot, DirectImage]], threads: 
     colors = np.array([lit.weights(fine_nm) for lit, _ in group]) * flux[:, :, None]
     chosen, gains, fits = basis_spectra(colors, max(1, len(group) // LIGHTS_PER_SPECTRUM))
     f_number = shot.working_f_number * scene.look.size
-    strength = scene.look.intensity * pattern.transmittance
-    pixel = (1.0 / float(pixels[2]), 1.0 / float(pixels[3]))
+    stretch = pattern_stretch(scene.settled.lens, shot)
+    strength = scene.look.intensity * pattern.transmittance / stretch
+    pixel = (1.0 / float(pixels[2]) / stretch, 1.0 / float(pixels[3]))
     draft = scene.settled.project.quality.mode == "draft"
     total: NDArray[np.floating] = np.zeros((shot.size_px[1], shot.size_px[0], 3), dtype=np.float32)
     for k, number in enumerate(chosen):
@@ -183,7 +184,9 @@ def _one_light(
     flux = direct_flux([shot], scene.settled.lens, [throughput], fine_nm)[0] * scene.look.intensity
     if not flux.any():
         return None
-    pixel = (1.0 / float(shot.to_pixels[2]), 1.0 / float(shot.to_pixels[3]))
+    # as the sensor sees a traced pupil, it is stretched already
+    stretch = 1.0 if scene.look.cats_eye else pattern_stretch(scene.settled.lens, shot)
+    pixel = (1.0 / float(shot.to_pixels[2]) / stretch, 1.0 / float(shot.to_pixels[3]))
     column = float(shot.to_pixels[0] + image.position_mm[0] * shot.to_pixels[2])
     row = float(shot.to_pixels[1] - image.position_mm[1] * shot.to_pixels[3])
     # a traced pupil has the size that the sensor sees, in units of the lens' f-number
@@ -215,7 +218,7 @@ def _one_light(
             size,
             (column + margin[0], row + margin[1]),
             fine_nm,
-            shot.weights(fine_nm) * (flux * pattern.transmittance / len(turns))[:, None],
+            shot.weights(fine_nm) * (flux * pattern.transmittance / (len(turns) * stretch))[:, None],
             # the centre of a starburst is clipped on screens
             split=1 if quality.mode == "draft" or quality.screen else NEAR_SPLIT,
             threads=threads,
