@@ -110,6 +110,19 @@ def test_cubic_interpolation_of_the_colour_matching_functions():
     assert not cie_1931([359.0, 831.0]).any()
 
 
+@pytest.mark.parametrize("lines", [((435.83, 1.0), (546.07, 1.0)), ((435.5, 1.0),), ((589.592, 1.0),)])
+def test_a_fine_table_holds_lines_between_whole_nanometres(lines):
+    """A table in steps of 0.05 nm is as bright and has the colour of its lines, wherever they lie."""
+    wave = np.arange(380.0, 780.0, 0.05)
+    power = sum(part * np.exp(-0.5 * ((wave - nm) / 0.1) ** 2) for nm, part in lines)
+    table = Tabulated(wavelength_nm=tuple(wave), power=tuple(power))
+    np.testing.assert_allclose(spectrum_xyz(table), spectrum_xyz(Lines(lines=lines)), rtol=2e-3)
+    # where it is even, a table has the colours of one in coarse steps, of which the ends count half a nanometre more
+    even = Tabulated(wavelength_nm=(400.0, 400.25, 700.0), power=(1.0, 1.0, 1.0))
+    coarse = Tabulated(wavelength_nm=(400.0, 700.0), power=(1.0, 1.0))
+    np.testing.assert_allclose(spectrum_xyz(even), spectrum_xyz(coarse), rtol=1e-3)
+
+
 def test_planck():
     # Stefan-Boltzmann: the integral of the radiance is sigma T^4 / pi.
     nm = np.geomspace(50, 1e6, 200000)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ...colorimetry import VISIBLE_NM
 from ...errors import FlarewrightError
 from ...model.project.camera import Colorspace
-from ...model.project.light import D65, BlackBody, EqualEnergy, Lines, Rgb, Spectrum
+from ...model.project.light import D65, BlackBody, EqualEnergy, Lines, Rgb, Spectrum, Tabulated
 from ...typing import Floats
 from .cie1931 import D65_POWER, TABLE_NM, cie_1931, cmf_at_1_nm
 from .rgb import xyz_to_rgb_matrix
@@ -393,7 +393,10 @@ def _stimulus(spectrum: Spectrum) -> tuple[Floats, Floats]:
         power = np.array([line[1] for line in spectrum.lines])
     else:
         wave = cmf_at_1_nm()[0]
-        power = spectral_power(spectrum, wave)
+        if isinstance(spectrum, Tabulated) and float(np.diff(spectrum.wavelength_nm).min()) < 1.0:
+            power = _means_of_table(spectrum, wave)
+        else:
+            power = spectral_power(spectrum, wave)
     largest = float(power.max())
     # scale first, so that a very cold black body does not underflow
     xyz = cie_1931(wave) * (power / largest if largest > 0.0 else power)[:, None]
@@ -403,3 +406,17 @@ def _stimulus(spectrum: Spectrum) -> tuple[Floats, Floats]:
             f"the spectrum ({spectrum.kind}) has no visible light; give it power between 380 and 780 nm"
         )
     return wave, xyz / luminance
+
+
+def _means_of_table(table: Tabulated, wave: Floats) -> Floats:
+    """Return the mean power of a table around each of `wave`, 1 nm apart, by hats: fine tables have lines between."""
+    nm = np.array(table.wavelength_nm)
+    nodes = np.union1d(nm, wave[(wave > nm[0]) & (wave < nm[-1])])
+    power, step = np.interp(nodes, nm, table.power), 0.5 * np.diff(nodes)
+    light = power * (np.append(step, 0.0) + np.append(0.0, step))
+    seen = (nodes >= wave[0]) & (nodes <= wave[-1])
+    at, light = nodes[seen] - wave[0], light[seen]
+    low = np.minimum(at.astype(np.intp), len(wave) - 2)
+    part = at - low
+    below, above = np.bincount(low, light * (1.0 - part), len(wave)), np.bincount(low + 1, light * part, len(wave))
+    return np.asarray(below + above, dtype=np.float64)
