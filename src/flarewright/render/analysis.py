@@ -18,7 +18,14 @@ from ..typing import Progress
 from .analysis_memory import AnalysisMemory, AnalysisPart
 from .image.partial_picture import digest_of
 from .progress_parts import progress_parts
-from .scene.resolve import build, check_in_front, check_opens, distance_from_front, open_lens
+from .scene.resolve import (
+    build,
+    check_distances,
+    check_in_front,
+    check_opens,
+    distance_from_front,
+    open_lens,
+)
 
 # time of the search for paths of four reflections, and of the ghosts
 _WEIGHTS = {"search": 1.0, "ghosts": 9.0}
@@ -45,8 +52,9 @@ def paraxial(
     Raises
     ------
     FlarewrightError
-        The lens is unknown, forms no image, or does not reach the f-number.
+        The lens is unknown, forms no image, or does not reach the f-number, or a distance is not above 0.
     """
+    check_distances(sensor_distance, focus_distance)
     known = open_lens(lens).lens
     check_opens(known, f_number)
     return first_order(known, f_number, sensor_distance=sensor_distance, focus_distance=focus_distance)
@@ -104,7 +112,7 @@ def ghosts(
     Raises
     ------
     FlarewrightError
-        As in `paraxial`, and for a coating that does not fit the lens.
+        As in `paraxial` and `find_ghosts`, and for a coating that does not fit the lens.
     """
     opened = open_lens(lens)
     built = build(
@@ -167,8 +175,13 @@ def find_ghosts(
     Raises
     ------
     ProjectError
-        The light stands in the lens, or the orders or their limit are unknown.
+        The light stands in or beside the lens, or the paths, the orders or their limit are unknown.
     """
+    if not all(-90.0 < angle < 90.0 for angle in query.field_deg):
+        across, up = query.field_deg
+        raise ProjectError(f"a light stands less than 90 degrees from the axis, not at ({across:g}, {up:g})")
+    if query.paths not in ("all", "same-side"):
+        raise ProjectError(f"paths are 'all' or 'same-side', not {query.paths!r}")
     if query.orders not in (2, 4) or not 0.0 < query.order4_limit < 1.0:
         raise ProjectError(
             f"orders are 2 or 4, not {query.orders}, and their limit lies between 0 and 1: {query.order4_limit:g}"

@@ -25,7 +25,7 @@ from flarewright.optics.lens.paraxial import first_order
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.optics.lens.tolerances import glass_groups
 from flarewright.optics.lens.zoom import at_position
-from flarewright.render.analysis import ghosts
+from flarewright.render.analysis import ghosts, paraxial
 from flarewright.render.scene.direct_image import defocus_mm
 from flarewright.render.scene.opening import make_opening
 from flarewright.render.scene.resolve import build, load_lens, resolve_project
@@ -251,6 +251,28 @@ def test_what_a_zoom_cannot_do_is_told():
         build(zoom, zoom="macro")
     with pytest.raises(ProjectError, match="has no positions"):
         build(load_lens("heliar-tronnier"), zoom=50.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"field_deg": (100.0, 0.0)}, r"less than 90 degrees from the axis, not at \(100, 0\)"),
+        ({"field_deg": (0.0, -90.0)}, "less than 90 degrees"),
+        ({"field_deg": (np.nan, 0.0)}, "less than 90 degrees"),
+        ({"paths": "same side"}, "'all' or 'same-side', not 'same side'"),
+        ({"sensor_distance": 0.0}, "of the sensor is finite and above 0 mm, not 0"),
+        ({"sensor_distance": np.inf}, "of the sensor is finite"),
+        ({"focus_distance": np.inf}, "of the plane in focus is finite and above 0 mm, not inf"),
+        ({"f_number": np.nan}, "an f-number is finite, not nan"),
+    ],
+)
+def test_an_analysis_refuses_what_no_lens_can_be_given(heliar, given, words):
+    """Each used to be analysed: a light at 100 degrees as one at -80, unknown paths as all."""
+    with pytest.raises(ProjectError, match=words):
+        ghosts(heliar, **{"field_deg": FIELD, **given})
+    if set(given) <= {"sensor_distance", "focus_distance", "f_number"}:
+        with pytest.raises(ProjectError, match=words):
+            paraxial(heliar, **given)
 
 
 def test_focus_positions_are_taken_by_the_distance(heliar):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from math import hypot
+from math import hypot, inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -231,12 +231,23 @@ def _with_heights(lens: Lens) -> Lens:
 
 
 def check_opens(lens: Lens, f_number: float | None) -> None:
-    """Raise a ProjectError if an f-number is faster than the lens; None is wide open."""
-    if f_number is not None and f_number < lens.f_number * (1.0 - 1e-6):
+    """Raise a ProjectError if an f-number is faster than the lens or is no number; None is wide open."""
+    if f_number is None:
+        return
+    if f_number < lens.f_number * (1.0 - 1e-6):
         raise ProjectError(
             f"f/{f_number:g} is faster than {lens.name} opens (f/{lens.f_number:g}); "
             f"choose f/{lens.f_number:g} or a larger number"
         )
+    if not isfinite(f_number):
+        raise ProjectError(f"an f-number is finite, not {f_number:g}")
+
+
+def check_distances(sensor_distance: float | None, focus_distance: float | None) -> None:
+    """Raise a ProjectError if a stated distance of the sensor or the plane in focus is not above 0 and finite."""
+    for distance, what in ((sensor_distance, "sensor"), (focus_distance, "plane in focus")):
+        if distance is not None and not 0.0 < distance < inf:
+            raise ProjectError(f"the distance of the {what} is finite and above 0 mm, not {distance:g}")
 
 
 @dataclass(frozen=True)
@@ -291,6 +302,7 @@ def build(
     FlarewrightError
         One of them does not fit the lens.
     """
+    check_distances(sensor_distance, focus_distance)
     remarks: list[str] = []
     choice: CoatingChoice = AsLens() if coating is None else coating
     lens = positioned(lens, zoom, focus_distance)
