@@ -63,6 +63,22 @@ def test_semicolons_decimal_commas_and_other_words(tmp_path):
     assert opened(tmp_path, diameters).lens == lens
 
 
+def test_a_table_of_curvatures_marks_its_stop_in_their_column(tmp_path):
+    """It was refused: no row is the stop."""
+    curvatures = TABLE.replace("radius", "curvature").replace("25.0,4.0", "0.04,4.0").replace("-40,1.5", "-0.025,1.5")
+    curvatures = curvatures.replace("30,2.0", f"{1 / 30!r},2.0").replace("120,4.0", f"{1 / 120!r},4.0")
+    curvatures = curvatures.replace("-30,60.0", f"{-1 / 30!r},60.0")
+    assert opened(tmp_path, curvatures).lens == opened(tmp_path, TABLE).lens
+
+
+@pytest.mark.parametrize("delimiter", [",", "; "])
+def test_the_column_of_numbers_may_be_named_by_a_hash(tmp_path, delimiter):
+    """Its header was taken for a comment, and the table refused."""
+    # a comment that a spreadsheet filled up with empty cells stays one
+    text = TABLE.replace("surface,radius", "# made up,,,,,,,,\n#,,,,,,,,\n#,radius").replace(",", delimiter)
+    assert opened(tmp_path, text).lens.rows == opened(tmp_path, TABLE).lens.rows
+
+
 def test_without_an_f_number_the_stop_gives_it(tmp_path):
     lens = opened(tmp_path, TABLE.replace("# f_number = 4\n", "")).lens
     assert first_order(lens).stop_semi_diameter == pytest.approx(5.0)

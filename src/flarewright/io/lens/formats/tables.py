@@ -1,10 +1,10 @@
 """Readers of plain tables of surfaces: CSV, and the lens files of pbrt (`.dat`).
 
-A CSV table has a header with `radius` (mm; `flat`, empty, 0 or inf is a plane, `stop` is the stop), `thickness`, and
-`n_d`, `v_d`, `glass`, `semi_diameter` (or `diameter`), `conic`, and `A4` to `A20` that are known. Lines that
-begin with `#` are comments; `# name = ...`, `# f_number = ...`, `# field_deg = ...` and `# focal_length = ...` state
-what the table cannot. Columns are separated by commas, semicolons or tabs; with the latter two a decimal
-comma is a point.
+A CSV table has a header with `radius` (mm; `flat`, empty, 0 or inf is a plane, `stop` is the stop) or `curvature`
+(1/mm, the same words), `thickness`, and `n_d`, `v_d`, `glass`, `semi_diameter` (or `diameter`), `conic`, and `A4` to
+`A20` that are known. Lines that begin with `#` are comments, except a header whose first column has that name;
+`# name = ...`, `# f_number = ...`, `# field_deg = ...` and `# focal_length = ...` state what the table cannot. Columns
+are separated by commas, semicolons or tabs; with the latter two a decimal comma is a point.
 
 A line of pbrt's table has the radius in mm (0 is the stop), the thickness, the index of the medium behind (0 and 1 are
 air) and the diameter of the aperture. Source: the documentation of the "realistic" camera in "Physically Based
@@ -52,7 +52,7 @@ def read_csv_table(path: str | Path) -> RawSequence:
     lines = _lines(path, "a CSV table of a lens")
     head = TableHead("line")
     table: list[tuple[int, list[str]]] = []
-    content = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
+    content = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not _is_comment(line)]
     first = content[0][1] if content else ""
     delimiter = max(",;\t", key=first.count)
     with sentences_for(path, "a CSV table of a lens"):
@@ -121,6 +121,18 @@ def _lines(path: str | Path, what: str) -> list[str]:
         return decoded(read_bytes(path, what)).splitlines()
 
 
+def _is_comment(line: str) -> bool:
+    """Whether a line is a comment; a header whose first column is named `#` is none."""
+    first, *others = re.split(r"[,;\t]", line)
+    named = first.strip() == "#" and any(_plain(name) in _ALIASES["thickness"] for name in others)
+    return line.startswith("#") and not named
+
+
+def _plain(name: str) -> str:
+    """Return the name of a column without its unit, spaces and capitals."""
+    return re.sub(r"\(.*\)|\[.*\]|[\s_\-]", "", name).lower()
+
+
 def _state(key: str, value: str, head: TableHead) -> None:
     if key in ("name", "notes"):
         setattr(head, key, value)
@@ -136,7 +148,7 @@ def _columns(names: Iterable[str], head: TableHead) -> dict[str, int]:
     """Return the place of each known column; a remark names the others."""
     found: dict[str, int] = {}
     for place, name in enumerate(names):
-        plain = re.sub(r"\(.*\)|\[.*\]|[\s_\-]", "", name).lower()
+        plain = _plain(name)
         key = next((key for key, aliases in _ALIASES.items() if plain in aliases), None)
         if key in found:
             head.problems.append(f"the columns {name!r} and {key!r} are the same; keep one")
@@ -152,7 +164,8 @@ def _columns(names: Iterable[str], head: TableHead) -> dict[str, int]:
 
 def _csv_row(number: int, given: dict[str, str], comma: bool, head: TableHead) -> list[TableRow]:
     """Return the row of a line; none after an error, which is appended."""
-    stop = given.get("radius", "").lower() == "stop" or given.get("stop", "").lower() in _STOP_WORDS
+    shape = given.get("radius", given.get("curvature", "")).lower()
+    stop = shape == "stop" or given.get("stop", "").lower() in _STOP_WORDS
     values: dict[str, float] = {}
     for key, text in given.items():
         if key in ("glass", "stop") or not text:
