@@ -35,6 +35,9 @@ def test_a_full_block_is_followed_by_another_and_keeps_its_tables():
     np.testing.assert_array_equal(large, numbers(50))
     # arrays of their own lie in no block
     assert common_block([numbers(3), numbers(3)]) is None
+    # nor do views of one picture, which a kernel cannot read as a table
+    picture = numbers(3, 4)
+    assert common_block([picture.ravel(), picture.ravel()]) is None
 
 
 def test_a_block_is_freed_with_its_last_table():

@@ -144,6 +144,18 @@ def test_a_ghost_keeps_its_flux(lens, path, f_number, field, width):
     assert found == pytest.approx(sharp, rel=2e-3)
 
 
+def test_crossings_that_share_a_picture_of_the_stop_are_drawn():
+    """Hullin's estimate has one pattern for all crossings; where it is a picture, drawing failed."""
+    scene = {
+        "iris": Iris(blades=7),
+        "lights": (Light(field_deg=(3.0, 2.0), spectrum=GREEN),),
+        "camera": Camera(size_px=(200, 200), sensor_mm=(20.0, 20.0)),
+    }
+    sharp, found = (picture(project("6-2", ringing, **scene)) for ringing in ("off", "frft"))
+    assert np.abs(found - sharp).max() > 0.1 * sharp.max()
+    assert found.sum() == pytest.approx(sharp.sum(), rel=2e-3)
+
+
 def test_a_disc_takes_the_rings_away_and_lines_show_more_than_white():
     # a strip across the centre of the ghost
     strip = Camera(size_px=(400, 40), sensor_mm=(20.0, 2.0))

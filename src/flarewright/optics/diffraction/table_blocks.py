@@ -60,7 +60,8 @@ def common_block(tables: Sequence[Pixels]) -> tuple[Pixels, list[int]] | None:
     [3, 0]
     """
     block = tables[0].base
-    if not isinstance(block, np.ndarray) or any(table.base is not block for table in tables):
+    # tables of a picture are views too, of rows and columns that are no block
+    if not isinstance(block, np.ndarray) or block.ndim != 1 or any(table.base is not block for table in tables):
         return None
     first = _address(block)
     return block, [(_address(table) - first) // block.itemsize for table in tables]
