@@ -23,7 +23,7 @@ export function lightPanel(app) {
   const one = (state) => state.lights[app.light];
   const set = (values, held = '') => app.lively('set_light', { light: app.light, values }, held);
   // changes of one of several numbers that a command takes together
-  const move = (axis, angle) => { const { light } = app; app.command('move_light', () => { const one = app.state.lights[light]?.field_deg.with(axis, angle); return one ? { light, x: one[0], y: one[1] } : null; }).catch(() => {}); };
+  const move = (axis, angle) => { const { light } = app; app.command('move_light', () => { const angles = app.state.lights[light]?.field_deg.with(axis, angle); return angles ? { light, x: angles[0], y: angles[1] } : null; }).catch(() => {}); };
   const reshape = (change) => { const { light } = app; app.lively('set_light', () => { const shape = structuredClone(app.state.lights[light]?.shape); if (!shape) return null; change(shape); return { light, values: { shape } }; }, ''); };
   const across = entry({ label: 'Right', tip: 'Field angle: the direct image lies focal length × tan(angle) to the right of the middle.', unit: '°', name: 'light_x', digits: 3, needed: 'needs an angle', get: (s) => one(s).field_deg[0], set: (x) => move(0, x) });
   const up = entry({ label: 'Up', tip: 'Field angle upwards. A light outside the frame has no direct image, but its ghosts may reach the frame.', unit: '°', name: 'light_y', digits: 3, needed: 'needs an angle', get: (s) => one(s).field_deg[1], set: (y) => move(1, y) });
