@@ -197,7 +197,7 @@ def _color_project(project: Project, problem: Problem, one: Outcome, path: Path)
 
 
 def _with_lens(project: Project, lens: Lens | str) -> Project:
-    """Return a project with a found lens, without what holds for the rows and gaps of its own lens only.
+    """Return a project with a found lens, without what holds only for the rows and gaps of the project's lens.
 
     The found lens has its own stop, focus and sensor, and stands for the whole of lens, filter and cover glass.
     """

@@ -36,7 +36,7 @@ class DetectedGhost:
     unwanted : bool
         Rejected by the user or as residual glow: the fit keeps it to explain its light, but the model omits it.
     glow : bool
-        Rejected as residual glow; what the user rejects is light of its own.
+        Rejected as residual glow; what the user rejects is light of the lens.
     """
 
     shapes: tuple[Shape, Shape, Shape]

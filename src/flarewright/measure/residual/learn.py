@@ -38,14 +38,14 @@ def with_residual(
     ----------
     model : GhostModel
     views : sequence of View
-        As photographed. Those of each nominal roll make sprites of their own, of which a replay draws the nearest.
+        As photographed. Those of each nominal roll make separate sprites, of which a replay draws the nearest.
     threads : int, optional
     journal : Journal, optional
         Journal of an interrupted run to resume; it does not change the result.
     """
     steps = journal or Journal()
     rolls = sorted({view.nominal_roll_deg for view in views})
-    # the residual of one roll does not become that of another by turning, so each roll has sprites of its own
+    # the residual of one roll does not become that of another by turning, so each roll has separate sprites
     series = [[view for view in views if view.nominal_roll_deg == roll] for roll in rolls]
     learned = [_sprites_of(model, each, threads, steps, len(rolls)) for each in series]
     if len(rolls) > 1:
