@@ -35,8 +35,8 @@ from ..scene.shot import Shot
 
 # largest number of wavelengths at which light is gathered, because it varies slowly with wavelength
 MOST_WAVELENGTHS = 3
-# radius of the first circle, pixels
-FIRST_RING = 0.25
+# radius of the first circle at most, pixels and mm: light within large pixels falls as steeply as over small ones
+FIRST_RING, FIRST_RING_MM = 0.25, 0.007
 # share of scattered light from which a remark reports that ghosts are drawn without that loss
 REPORTED_SHARE = 2e-3
 # rows of a filter in front of the rows of the lens
@@ -53,7 +53,7 @@ class Sampling(NamedTuple):
     rays : int
         `rays` squared from each point of the sensor, over the aperture of a surface or over the iris.
     rings : int
-        Circles of points around the direct image.
+        Circles of points around the direct image, from a quarter of a pixel on.
     spokes, fan : int
         Points of a circle: all around, and over a picture beside the direct image.
     """
@@ -244,7 +244,7 @@ def _nodes(shot: Shot, centre: Floats, sampling: Sampling) -> tuple[Floats, Floa
     pixel = 1.0 / float(shot.to_pixels[2:].max())
     if (low < 0.0).all() and (high > 0.0).all():
         return (
-            np.geomspace(FIRST_RING * pixel, far, sampling.rings),
+            _radii(0.0, far, pixel, sampling.rings),
             2.0 * pi * np.arange(sampling.spokes) / sampling.spokes,
             True,
         )
@@ -252,7 +252,14 @@ def _nodes(shot: Shot, centre: Floats, sampling: Sampling) -> tuple[Floats, Floa
     towards = np.arctan2(*(0.5 * (low + high))[::-1])
     turned = np.angle(np.exp(1j * (np.arctan2(seen[:, 1], seen[:, 0]) - towards)))
     angles = towards + np.linspace(turned.min() - 1e-3, turned.max() + 1e-3, sampling.fan)
-    return np.geomspace(max(0.999 * near, FIRST_RING * pixel), far, sampling.rings), angles, False
+    return _radii(0.999 * near, far, pixel, sampling.rings), angles, False
+
+
+def _radii(near: float, far: float, pixel: float, rings: int) -> Floats:
+    """Return the radii of circles between two distances, mm: `rings` of them, and more within large pixels."""
+    usual = max(near, FIRST_RING * pixel)
+    first = min(usual, max(near, FIRST_RING_MM))
+    return np.geomspace(first, far, ceil(rings * log(far / first) / log(far / usual)))
 
 
 def gather(
