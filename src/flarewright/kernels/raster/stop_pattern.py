@@ -115,7 +115,8 @@ def place_in_pattern(table, corners, k, stops, count):
     int
         `OPEN`: the pattern is 1. `ON_EDGE`: the first coordinate is the position in the table of a straight edge.
         `ALONG_BLADE`: coordinates along the normal of a blade and along the blade, mm, where both nearest corners
-        belong to that blade. `ROUND`, `PICTURE`, `ANYWHERE`: unchanged, mm.
+        belong to that blade. `ROUND`: from the centre of the opening or of a blade's arc, mm. `PICTURE`, `ANYWHERE`:
+        unchanged, mm.
     """
     if table[k, CORNERS] < 0.0:
         return PICTURE
@@ -152,6 +153,11 @@ def place_in_pattern(table, corners, k, stops, count):
     if not aside:
         blade = corner if left else np.int64((corner + 1) % many)
     nx, ny = _normal(table, corners, k, blade)
+    if aside and table[k, RADIUS] != 0.0 and _is_beside_corners(table, k, nx, ny, stops, count):
+        back = table[k, OFFSET] - table[k, RADIUS]
+        for m in range(count):
+            stops[m, 0], stops[m, 1] = stops[m, 0] - back * nx, stops[m, 1] - back * ny
+        return ROUND
     on_edge = aside and table[k, RADIUS] == 0.0 and not _near_corner(table, corners, k, blade, stops, count)
     for m in range(count):
         x, y = stops[m, 0], stops[m, 1]
@@ -188,6 +194,21 @@ def _near_corner(table, corners, k, blade, stops, count):
         if low < reach and high > -reach and left < outer and right > -inner_end:
             return True
     return False
+
+
+@borrowing
+def _is_beside_corners(table, k, nx, ny, stops, count):
+    """Return whether a polygon nearest to one curved blade, of this normal, reads no table of a corner."""
+    low, left, right = np.inf, np.inf, -np.inf
+    for m in range(count):
+        p, q = nx * stops[m, 0] + ny * stops[m, 1], abs(nx * stops[m, 1] - ny * stops[m, 0])
+        # both ends of the blade folded onto one corner, as in `weave`
+        along, across = p * table[k, COSINE] + q * table[k, SINE], abs(q * table[k, COSINE] - p * table[k, SINE])
+        beyond, other = beyond_blade(table, k, along, across), beyond_blade(table, k, along, -across)
+        low = min(low, (beyond - other) * table[k, TO_ACROSS] * table[k, PER_MM_Y])
+        column = (beyond + other) * table[k, TO_ALONG] * table[k, PER_MM_X] + table[k, AT_X]
+        left, right = min(left, column), max(right, column)
+    return low >= table[k, ROWS] - 1.0 or right < 0.0 or left >= table[k, COLUMNS] - 1.0
 
 
 @inner
