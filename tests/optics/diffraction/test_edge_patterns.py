@@ -14,6 +14,7 @@ from flarewright.optics.diffraction import edge_patterns
 from flarewright.optics.diffraction.edge_patterns import (
     CORNER_SAMPLES,
     EDGE_SAMPLES,
+    NEARLY_STRAIGHT,
     PROFILE_SAMPLES,
     Corner,
     averaged,
@@ -187,3 +188,25 @@ def test_pixels_average_and_keep_the_light():
     places = np.arange(len(sharp.profile)) - len(sharp.profile) // 2
     wide = np.interp(places, np.arange(len(coarse.profile)) - len(coarse.profile) // 2, coarse.profile)
     assert wide.sum() == pytest.approx(sharp.profile.sum(), rel=1e-3)
+
+
+@pytest.mark.parametrize("s_mm", [0.02, 0.05, 0.11])
+def test_nearly_straight_blades_share_tables_over_an_octave(s_mm):
+    """The effect of a weak curvature changes so little over an octave that the octave's middle serves it all."""
+    form = blade_form(blade_edges(Iris(blades=6, rounding=0.03), 10.0))
+    assert form.curvature * s_mm < NEARLY_STRAIGHT
+    corner = corner_of(form, s_mm)
+    assert math.frexp(corner.scale)[0] == 0.5
+    shared, size = edge_tables(corner), s_mm / form.offset
+    exact = edge_patterns._tables(corner.gamma, corner.blunt, 1.0 / size, corner.curvature * size, REACH)
+    error = shared.corner - exact.corner
+    assert np.abs(error).max() < 2e-3
+    assert math.sqrt(np.mean(error**2)) < 3e-4
+    assert np.abs(shared.profile - exact.profile).max() < 5e-4
+
+
+def test_pixels_of_the_same_samples_share_tables():
+    form = blade_form(blade_edges(Iris(blades=6), 10.0))
+    tables = [averaged(form, 0.05, 0.02, pixel) for pixel in (0.1, 0.11, 0.13, 0.9)]
+    assert tables[0] is tables[1]
+    assert tables[2] is not tables[3]
