@@ -42,6 +42,9 @@ SPREADS_AN_OCTAVE, PIXELS_AN_OCTAVE, SCALES_AN_OCTAVE = 8, 4, 4
 NEARLY_STRAIGHT = 2e-3
 """s over the radius of curvature below which an octave of s shares tables: error 2e-3 at worst, 3e-4 rms."""
 
+SMALL_SPREAD = 0.01
+"""Below this spread half as many steps per octave have no larger error than all steps have above it."""
+
 LEAST_SPREAD, LEAST_PIXEL = 3e-3, 0.1
 """Smaller values have no visible effect."""
 
@@ -299,12 +302,13 @@ def averaged(form: BladeForm, scale: float, spread: float, pixel: float = 0.0) -
         Shared by similar arguments (`SPREADS_AN_OCTAVE` and the other steps). For a band, the spread alone determines
         how its fringes fade.
     """
-    width = -math.inf if spread < LEAST_SPREAD else round(SPREADS_AN_OCTAVE * math.log2(spread))
+    steps = SPREADS_AN_OCTAVE // 2 if spread < SMALL_SPREAD else SPREADS_AN_OCTAVE
+    width = -math.inf if spread < LEAST_SPREAD else round(steps * math.log2(spread)) / steps
     step = -math.inf if pixel < LEAST_PIXEL else round(PIXELS_AN_OCTAVE * math.log2(pixel))
     side = 2.0 ** (step / PIXELS_AN_OCTAVE)
     margin = 0.5 * math.ceil(2.0 * (REACH + 0.5 + 0.5 * side))
     halves = _half_width(side * PROFILE_SAMPLES), _half_width(side * CORNER_SAMPLES)
-    return _averaged(corner_of(form, scale), 2.0 ** (width / SPREADS_AN_OCTAVE), margin, *halves)
+    return _averaged(corner_of(form, scale), 2.0**width, margin, *halves)
 
 
 @lru_cache(maxsize=KEPT_AVERAGES)
