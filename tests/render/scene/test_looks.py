@@ -14,15 +14,18 @@ from flarewright.model import (
     InTurn,
     Iris,
     Light,
+    LightCurve,
     PerRow,
     Preset,
     Project,
+    ProjectCurve,
     QuarterWave,
     Rule,
 )
 from flarewright.optics.rays.pack import resolve_coatings, rows_in_air
 from flarewright.render.scene.looks import demonstration, look_of, with_look
 from flarewright.render.scene.resolve import load_lens, resolve_project
+from flarewright.workflow.keyframes import project_at
 
 TESSAR, TAKUMAR = "tessar-brendel", "takumar-50-f1.4"
 
@@ -56,6 +59,28 @@ def test_a_look_leaves_lens_places_and_strengths_alone():
     # a rule that names a ghost of another lens is left out, with a remark
     assert [rule.select for rule in after.art.rules] == ["brightest:3"]
     assert remarks == ("1 of the look's rules name ghosts of tessar-brendel and are left out",)
+
+
+def test_values_of_a_look_replace_the_curves_of_a_project():
+    """A curve would override the look; curves of other values stay."""
+
+    def curve(of, first, last):
+        record = LightCurve if of in ("rgb", "intensity") else ProjectCurve
+        return record(of=of, at_s=(0.0, 1.0), values=(first, last))
+
+    brightening = curve("intensity", 1.0, 2.0)
+    light = Light(field_deg=(-9.0, 5.0), curves=(curve("rgb", (1.0, 0.5, 0.2), (1.0, 1.0, 1.0)), brightening))
+    turning = curve("rotation_deg", 0.0, 90.0)
+    project = Project(
+        lens=TAKUMAR, lights=(light,), curves=(curve("f_number", 4.0, 11.0), turning, curve("gain.ghosts", 0.0, 1.0))
+    )
+    after, remarks = with_look(project, look_of(rich(), "Dusk")[0])
+    moment = project_at(after, 1.0)
+    assert (moment.f_number, moment.art.gain) == (8.0, {"ghosts": 2.0})
+    assert moment.lights[0].spectrum == BlackBody(temperature_k=2500.0)
+    assert (after.curves, after.lights[0].curves) == ((turning,), (brightening,))
+    words = "the look's values replace the project's curves of f_number, gain.ghosts, rgb of light 0 (counted from 0)"
+    assert words in remarks
 
 
 def test_coatings_by_row_go_to_another_lens_in_turn():

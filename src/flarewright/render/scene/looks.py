@@ -17,6 +17,10 @@ from ...sentences import INVALID, validation_sentences
 from .photographic_defaults import as_photographed
 from .resolve import open_lens
 
+# keys of a look whose values a curve of another name sets
+_LOOK_KEYS = {"f_number": "f_number", "rotation_deg": "iris.rotation_deg"}
+_COLOURS = ("rgb", "temperature_k")
+
 
 def with_look(project: Project, look: Look | str | PathLike[str]) -> tuple[Project, tuple[str, ...]]:
     """Apply a look to a project.
@@ -31,9 +35,10 @@ def with_look(project: Project, look: Look | str | PathLike[str]) -> tuple[Proje
     Returns
     -------
     project : Project
-        Lights with a size keep it. The f-number is at least that of the lens.
+        Lights with a size keep it. The f-number is at least that of the lens. Curves of values that the look sets are
+        left out.
     remarks : tuple of str
-        Parts of the look that do not fit this lens.
+        Parts of the look that do not fit this lens, and the curves that are left out.
 
     Raises
     ------
@@ -70,7 +75,9 @@ def with_look(project: Project, look: Look | str | PathLike[str]) -> tuple[Proje
             changes["lights"] = tuple(_with_look_light(light, look) for light in project.lights)
         else:
             changes[section] = getattr(look.example, section)
-    found: Project = project.replace(**changes)
+    found, replaced = _without_curves(project.replace(**changes), look)
+    if replaced:
+        remarks.append(f"the look's values replace the project's curves of {', '.join(replaced)}")
     return found, tuple(remarks)
 
 
@@ -131,6 +138,24 @@ def without_lens_rules(art: Art) -> Art:
 def _named(select: str) -> str:
     """Return the part of a selector that can name ghosts of one lens; numbers of `brightest` and `largest` do not."""
     return "" if "brightest:" in select or "largest:" in select else select
+
+
+def _without_curves(project: Project, look: Look) -> tuple[Project, list[str]]:
+    """Return a project without curves of values that a look sets, which they would override; and their names."""
+    # the art table is applied as a whole, with the gains that it leaves at 1
+    kept = tuple(
+        curve
+        for curve in project.curves
+        if ("art" if curve.of.startswith("gain.") else _LOOK_KEYS.get(curve.of)) not in look.says
+    )
+    replaced: list[str] = [curve.of for curve in project.curves if curve not in kept]
+    if "lights.spectrum" not in look.says:
+        return project.replace(curves=kept), replaced
+    lights = []
+    for k, light in enumerate(project.lights):
+        replaced += [f"{curve.of} of light {k} (counted from 0)" for curve in light.curves if curve.of in _COLOURS]
+        lights.append(light.replace(curves=tuple(curve for curve in light.curves if curve.of not in _COLOURS)))
+    return project.replace(curves=kept, lights=tuple(lights)), replaced
 
 
 def _with_look_light(light: Light, look: Look) -> Light:
