@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from flarewright.cli.app import run
 from flarewright.io.images.exr import read_exr
@@ -52,6 +53,43 @@ def test_a_light_is_drawn_at_its_pixel_from_either_corner(folder, capsys):
     assert project.camera.sensor_mm == pytest.approx((45.0, 29.25))
     assert (project.lights[1].name, project.lights[1].diameter_deg) == ("sun", 0.53)
     assert "overscan: the picture is 80x52 pixels, the frame of 64x36 in its middle" in capsys.readouterr().err
+
+
+def test_a_holdout_stays_over_the_frame_of_a_picture_with_overscan(folder, capsys):
+    """It was stretched over the larger picture, and hid lights beside its black pixels."""
+    matte = np.full((36, 64), 255, np.uint8)
+    matte[6:15, 46:55] = 0
+    Image.fromarray(matte).save("matte.png")
+    # 50.5 px and 60 px of the frame: behind the matte, and beside it
+    for column, black in ((50.5, True), (57.0, False)):
+        words = ["--size", "64x36", "--light-px", f"{column},10.5", "--holdout", "matte.png", "--overscan", "20px"]
+        assert run([*RENDER, *words]) == 0
+        assert ("hides every light" in capsys.readouterr().err) is black
+        _, project = brightest("a.exr")
+        assert project.holdout.frame == pytest.approx((64 / 104, 36 / 76))
+
+
+def test_a_render_and_a_check_use_the_frames_of_a_holdout_sequence(folder, capsys):
+    """A render asked for a file with signs in its name, and a check called the project unusable."""
+    for frame, level in ((1, 255), (2, 0)):
+        Image.fromarray(np.full((36, 64), level, np.uint8)).save(f"matte.{frame}.png")
+    words = ["--size", "64x36", "--light", "4,2"]
+    for frame, black in ((1, False), (2, True)):
+        assert run([*RENDER, *words, "--holdout", "matte.#.png", "--frame", str(frame)]) == 0
+        said = capsys.readouterr().err
+        assert ("hides every light" in said, f"frame {frame}, " in said) == (black, True)
+    assert run([*RENDER, *words, "--holdout", "matte.#.png", "--frame", "3"]) == 2
+    assert "the holdout matte.#.png lacks frame 3" in capsys.readouterr().err
+    assert run([*RENDER, *words, "--holdout", "matte.#.png"]) == 2
+    assert "matte.#.png is a sequence: add --frame N" in capsys.readouterr().err
+    head = f"lens = '{LENS}'\n[camera]\nsize_px = [64, 36]\n[holdout]\nimage = 'matte.#.png'\n"
+    light = "[[lights]]\nfield_deg = [4.0, 2.0]\n"
+    Path("still.toml").write_text(head + light)
+    assert run(["project", "check", "still.toml"]) == 0
+    moving = "keyframes = [{ at_s = 0.0, field_deg = [1.0, 2.0] }, { at_s = 0.1, field_deg = [2.0, 2.0] }]\n"
+    Path("moving.toml").write_text(head + light + moving)
+    assert run(["project", "check", "moving.toml"]) == 2
+    assert "lacks frames 3-4" in capsys.readouterr().err
 
 
 def test_a_shot_follows_a_track_and_a_render_shows_one_of_its_frames(folder, capsys):

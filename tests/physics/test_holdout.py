@@ -225,6 +225,24 @@ def test_outside_the_plate_nothing_is_hidden(tmp_path):
         assert sum(shot.share for shot in make_shots(settled, make_opening(settled, None))) == pytest.approx(left)
 
 
+def test_a_plate_lies_over_the_frame_of_a_picture_with_overscan(tmp_path):
+    """The same pixels hide the same light, with a margin around the frame that has other proportions."""
+    made = project(Light(field_deg=(8.0, -5.0), spectrum=D_LINE))
+    x, y = render(made).summary["lights"][0]["direct_position_mm"]
+    zoom = SIZE[0] * FINE / 36.0
+    column, row = int(SIZE[0] * FINE / 2 + x * zoom), int(SIZE[1] * FINE / 2 - y * zoom)
+    spot = np.full((SIZE[1] * FINE, SIZE[0] * FINE), 255, dtype=np.uint8)
+    spot[row - 1 : row + 2, column - 1 : column + 2] = 0
+    Image.fromarray(spot).save(tmp_path / "spot.png")
+    size = (SIZE[0] + 40, SIZE[1] + 40)
+    wide = made.camera.replace(size_px=size, sensor_mm=(36.0 * size[0] / SIZE[0], 36.0 * size[1] / SIZE[0]))
+    frame = (SIZE[0] / size[0], SIZE[1] / size[1])
+    for camera, part in ((made.camera, (1.0, 1.0)), (wide, frame)):
+        held = Holdout(image=str(tmp_path / "spot.png"), frame=part)
+        settled = resolve_project(made.replace(camera=camera, holdout=held))
+        assert make_shots(settled, make_opening(settled, None))[0].share == pytest.approx(0.0, abs=1e-6)
+
+
 def test_a_depth_plate_hides_what_is_behind(tmp_path):
     """In metres: a lamp at 4 m, the sun, and pixels without an object."""
     lamp = DISC.replace(distance=4000.0, diameter_deg=0.0)

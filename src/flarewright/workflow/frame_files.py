@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
-from ..jobs.frame_list import FramePattern
+from ..errors import ProjectError
+from ..jobs.frame_list import FramePattern, frames_text
 from ..model import Project
 
 
@@ -12,6 +14,27 @@ def holdout_files(project: Project) -> tuple[str, ...]:
     """Return the files that hide lights of a project, or names with a place for the number of the frame."""
     holdouts = [project.holdout, *(light.holdout for light in project.lights)]
     return tuple(name for each in holdouts if each is not None for name in (each.image, each.depth) if name is not None)
+
+
+def holdout_sequences(project: Project) -> list[FramePattern]:
+    """Return the sequences of images that hide lights."""
+    return [pattern for pattern in map(FramePattern, sorted({*holdout_files(project)})) if pattern.numbered]
+
+
+def check_holdout_frames(project: Project, frames: Sequence[int]) -> None:
+    """Raise ProjectError if a frame of a sequence that hides lights is missing or no picture; reads headers only."""
+    from ..io.images.plate_image import check_header
+
+    for pattern in holdout_sequences(project):
+        there = set(pattern.found())
+        missing = [frame for frame in frames if frame not in there]
+        if missing:
+            raise ProjectError(
+                f"the holdout {pattern.text} lacks frame{'s'[: len(missing) > 1]} {frames_text(missing)[:80]}; give "
+                "frames that exist"
+            )
+        for frame in frames:
+            check_header(pattern.path(frame))
 
 
 def with_frame_files(project: Project, frame: float) -> Project:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from math import fmod
+from math import ceil, fmod
 from typing import Any
 
 import numpy as np
@@ -131,6 +131,12 @@ def length_s(project: Project) -> float:
     times = [light.keyframes[-1].at_s for light in project.lights if light.keyframes]
     curves = [*project.curves, *(curve for light in project.lights for curve in light.curves)]
     return max([*times, *(curve.at_s[-1] for curve in curves)], default=0.0)
+
+
+def last_frame(project: Project) -> int:
+    """Return the number of the first frame at or after the last key; that at 0 s without keys."""
+    timeline = project.timeline
+    return timeline.start + ceil(length_s(project) * float(frame_rate(timeline.fps)) - 1e-6)
 
 
 def peak_intensity(project: Project) -> float:

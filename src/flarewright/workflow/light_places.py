@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import ceil
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from ..errors import ProjectError
 from ..model import Light, LightCurve, LightKey, Project, Timeline
 from ..model.project.animation import FIRST_FRAME, LAST_FRAME, LAST_S
 from ..typing import Floats
-from .keyframes import frame_rate, is_still, length_s, light_at, project_at, still, time_of
+from .keyframes import is_still, last_frame, light_at, project_at, still, time_of
 
 if TYPE_CHECKING:
     from ..io.tracks.track import Track, TrackFile
@@ -135,8 +134,7 @@ def resting_tracks(project: Project, places: Mapping[int, tuple[float, float]]) 
 
     if not any(curve.of in _LENS_CURVES for curve in project.curves):
         return []
-    start, fps = project.timeline.start, float(frame_rate(project.timeline.fps))
-    frames = np.arange(start, start + ceil(length_s(project) * fps - 1e-6) + 1, dtype=np.float64)
+    frames = np.arange(project.timeline.start, last_frame(project) + 1, dtype=np.float64)
     return [(index, Track("--light-px", frames, np.tile(place, (len(frames), 1)))) for index, place in places.items()]
 
 

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import FlarewrightError, ProjectError
+from .frame_files import check_holdout_frames, holdout_sequences, with_frame_files
+from .keyframes import is_still, last_frame
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
 
 def open_project_files(file: Path | str, project: Project) -> ResolvedProject:
     """Read all files that a project's render reads, and check its lens at every key of its curves.
+
+    Sequences of images that hide lights need the frames up to the last key.
 
     Parameters
     ----------
@@ -34,7 +38,6 @@ def open_project_files(file: Path | str, project: Project) -> ResolvedProject:
     from ..optics.rays.pack import resolve_coatings
     from ..render.scattering.scatter_pass import check_scatter
     from ..render.scene.art_rules import resolve_art
-    from ..render.scene.holdout import read_plates
     from ..render.scene.resolve import resolve_project
     from ..render.starburst.starburst_pass import read_soil
     from ..sentences import summary
@@ -47,7 +50,7 @@ def open_project_files(file: Path | str, project: Project) -> ResolvedProject:
         lambda: check_scatter(settled),
         lambda: None if mask is None else read_mask(mask),
         lambda: read_soil(project.dirt),
-        *(partial(read_plates, project, light) for light in project.lights),
+        *_holdout_stages(project),
         *(partial(_check_moment, project, at_s) for at_s in _times(project)),
     ]
     errors: dict[str, FlarewrightError] = {}
@@ -61,6 +64,34 @@ def open_project_files(file: Path | str, project: Project) -> ResolvedProject:
     if errors:
         raise ProjectError(summary(str(file), list(errors)), tuple(errors))
     return settled
+
+
+def _holdout_stages(project: Project) -> list[Callable[[], object]]:
+    """Return what reads the images that hide lights: all headers of sequences, and the pixels of one frame."""
+    from ..render.scene.holdout import read_plates
+
+    shown = project
+    try:
+        if sequences := holdout_sequences(project):
+            if is_still(project):
+                # any frames of the sequences can be drawn
+                frames = sorted(set.intersection(*(set(pattern.found()) for pattern in sequences)))
+                if not frames:
+                    raise ProjectError(
+                        f"the holdouts {', '.join(each.text for each in sequences)} have no frame in common; give "
+                        "sequences with the same numbers"
+                    )
+            else:
+                frames = list(range(project.timeline.start, last_frame(project) + 1))
+            check_holdout_frames(project, frames)
+            shown = with_frame_files(project, frames[0])
+    except FlarewrightError as error:
+        return [partial(_raise, error)]
+    return [partial(read_plates, shown, light) for light in shown.lights]
+
+
+def _raise(error: FlarewrightError) -> None:
+    raise error
 
 
 def _times(project: Project) -> list[float]:

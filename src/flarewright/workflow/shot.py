@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import ceil
 from operator import index
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
@@ -17,8 +16,8 @@ from ..jobs.frame_list import FramePattern, chunk_of, frames_text, parse_chunk, 
 from ..jobs.processes import fitting, shares, work_off
 from ..model import Project
 from ..typing import Report
-from .frame_files import holdout_files
-from .keyframes import frame_rate, is_still, length_s, time_of
+from .frame_files import check_holdout_frames, holdout_files, holdout_sequences
+from .keyframes import is_still, last_frame, length_s, time_of
 
 if TYPE_CHECKING:
     from ..jobs.cluster.executor import Cluster
@@ -198,7 +197,7 @@ def shot(
             found = _own_plate(project)
         if found is not None:
             remarks += found.remarks
-        _check_sequences(project, mine)
+        check_holdout_frames(project, mine)
         plan = ShotPlan(project, pattern.text, shutter_deg, subframes, parts, cropped, found, comp, radiance)
         if not mine:
             return ShotResult((), (*remarks, f"chunk {chunk} of {len(numbers)} frames is empty"), 0, found)
@@ -336,27 +335,6 @@ def _searched(
     )
 
 
-def _sequences(project: Project) -> list[FramePattern]:
-    """Return the sequences of images that hide lights."""
-    return [pattern for pattern in map(FramePattern, sorted({*holdout_files(project)})) if pattern.numbered]
-
-
-def _check_sequences(project: Project, frames: Sequence[int]) -> None:
-    """Raise an error before the work if a frame of a sequence that hides lights is missing or no picture."""
-    from ..io.images.plate_image import check_header
-
-    for pattern in _sequences(project):
-        there = set(pattern.on_disk())
-        missing = [frame for frame in frames if frame not in there]
-        if missing:
-            raise ProjectError(
-                f"the holdout {pattern.text} lacks frame{'s'[: len(missing) > 1]} {frames_text(missing)[:80]}; give "
-                "frames that exist"
-            )
-        for frame in frames:
-            check_header(pattern.path(frame))
-
-
 def shot_frames(
     project: Project, frames: str | Sequence[int] | None, plate: PlateSettings | None = None
 ) -> tuple[tuple[int, ...], list[str]]:
@@ -381,20 +359,19 @@ def shot_frames(
         from .plates.plate_files import plate_frames
 
         wanted = plate_frames(replace(plate, first=project.timeline.start), parsed_frames(frames))
-    timeline, long_s = project.timeline, length_s(project)
-    last = timeline.start + ceil(long_s * float(frame_rate(timeline.fps)) - 1e-6)
+    timeline, last = project.timeline, last_frame(project)
     if wanted is None:
         if is_still(project):
             raise ProjectError("nothing in the project moves, so it has no last frame; give the frames, such as 1-24")
         return tuple(range(timeline.start, last + 1)), []
     if is_still(project):
-        alike = plate is None and len(wanted) > 1 and not _sequences(project)
+        alike = plate is None and len(wanted) > 1 and not holdout_sequences(project)
         return wanted, ["nothing in the project moves: all frames are alike"] if alike else []
     outside = [frame for frame in wanted if not timeline.start <= frame <= last]
     if len(outside) == len(wanted):
         raise ProjectError(
             f"frames {frames_text(wanted)[:80]} lie outside the project's {timeline.start}-{last} (frame "
-            f"{timeline.start} is at 0 s, the last key at {long_s:g} s); give frames inside, or --start "
+            f"{timeline.start} is at 0 s, the last key at {length_s(project):g} s); give frames inside, or --start "
             f"{wanted[0]}, the number of the frame at 0 s"
         )
     if not outside:

@@ -151,7 +151,7 @@ intensity = 1.0
 spectrum = { kind = "table", wavelength_nm = [400.0, 700.0], power = [1.0, 1.0] }
 shape = { kind = "rectangle", size_deg = [4.0, 3.0], rotation_deg = 15.0 }
 keyframes = [{ at_s = 0.0, field_deg = [1.0, 1.0] }]
-holdout = { image = "a.png", invert = true, overscan = 1.2 }
+holdout = { image = "a.png", invert = true, overscan = 1.2, frame = [0.9, 0.8] }
 [[lights]]
 field_deg = [1, 5]
 diameter_deg = 0.53

@@ -143,9 +143,9 @@ def project_of_options(
             settings, flags, counted_px, fps_given="fps" in (timeline or {}), start_given="start" in (timeline or {})
         )
         remarks += found
-    if options.frame is not None or options.at_s is not None:
+    if timeline is None:
         settings, moment = _at_moment(settings, options)
-        remarks = [moment, *remarks]
+        remarks = [*moment, *remarks]
     if options.light_px:
         settings, found = with_pixel_lights(
             settings, options, len(options.light), counted_px, over_time=timeline is not None
@@ -182,24 +182,33 @@ def _check_places(options: RenderOptions, timeline: dict[str, Any] | None) -> No
                 raise ProjectError(f"--resume continues a picture with its settings; omit {flag}")
 
 
-def _at_moment(project: Project, options: RenderOptions) -> tuple[Project, str]:
-    """Return the project of --frame or --time, and a remark that names the moment."""
+def _at_moment(project: Project, options: RenderOptions) -> tuple[Project, list[str]]:
+    """Return the project of --frame or --time, if one is given, and a remark that names the moment."""
     from ...model.project.animation import LAST_S
-    from ...workflow.keyframes import is_still, length_s, project_at, still, time_of
+    from ...workflow.frame_files import check_holdout_frames, holdout_sequences, with_frame_files
+    from ...workflow.keyframes import frame_rate, is_still, length_s, project_at, still, time_of
 
+    sequences = holdout_sequences(project)
+    if options.frame is None and options.at_s is None:
+        if sequences:
+            raise ProjectError(
+                f"the holdout {sequences[0].text} is a sequence: add --frame N, or draw all with flarewright shot"
+            )
+        return project, []
     if options.frame is not None and options.at_s is not None:
         raise ProjectError("--frame and --time both choose the moment; keep one")
     if options.resume is not None:
         raise ProjectError("--resume continues a picture with its settings; omit --frame and --time")
-    if is_still(project):
-        return project, "nothing in the project moves: --frame and --time have no effect"
+    if is_still(project) and not sequences:
+        return project, ["nothing in the project moves: --frame and --time have no effect"]
     if options.frame is not None:
         at_s = time_of(options.frame, project.timeline)
         words = f"frame {options.frame}, {at_s:g} s ({project.timeline.fps:g} frames per second)"
     else:
         assert options.at_s is not None
         at_s, words = options.at_s, f"the moment {options.at_s:g} s"
-    if not 0.0 <= at_s <= LAST_S:
+    # a sequence of holdouts alone has any numbers
+    if not 0.0 <= at_s <= LAST_S and not (is_still(project) and options.frame is not None):
         flag = "--frame" if options.frame is not None else "--time"
         raise ProjectError(
             f"{flag}: {at_s:g} s lies outside the time of a project, 0 to {LAST_S:g} s; the frame at 0 s is "
@@ -207,8 +216,13 @@ def _at_moment(project: Project, options: RenderOptions) -> tuple[Project, str]:
         )
     last_s = length_s(project)
     # times of frames are rounded
-    rests = f"; everything rests after the last key at {last_s:g} s" if at_s > last_s + 1e-6 else ""
-    return still(project_at(project, at_s)), f"{words} is drawn{rests}"
+    rests = at_s > last_s + 1e-6 and not is_still(project)
+    words += f" is drawn{f'; everything rests after the last key at {last_s:g} s' if rests else ''}"
+    frame = options.frame
+    if frame is None:
+        frame = round(project.timeline.start + at_s * float(frame_rate(project.timeline.fps)))
+    check_holdout_frames(project, [frame])
+    return with_frame_files(still(project_at(project, at_s)), frame), [words]
 
 
 def _without_effect(options: RenderOptions, settings: Project) -> list[str]:

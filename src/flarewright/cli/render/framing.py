@@ -10,7 +10,7 @@ from ..common import picture_size
 
 if TYPE_CHECKING:
     from ...io.project.camera_list import CameraFormat
-    from ...model import Project
+    from ...model import Holdout, Project
     from .options.record import RenderOptions
 
 # width of a picture of film, which has no pixels
@@ -62,7 +62,22 @@ def framed(project: Project, flags: RenderOptions) -> tuple[Project, tuple[int, 
             f"overscan: the picture is {size[0]}x{size[1]} pixels, the frame of {counted[0]}x{counted[1]} in its middle"
         )
     camera = {**dict(project.camera), "size_px": size, "sensor_mm": sensor}
+    project = project if size == counted else _with_frame(project, counted, size)
     return project_of({**dict(project), "camera": camera}), counted, remarks
+
+
+def _with_frame(project: Project, frame_px: tuple[int, int], size_px: tuple[int, int]) -> Project:
+    """Return a project whose holdouts lie over the frame in the middle of a picture with overscan."""
+    shrunk = (frame_px[0] / size_px[0], frame_px[1] / size_px[1])
+
+    def placed(holdout: Holdout | None) -> Holdout | None:
+        if holdout is None:
+            return None
+        return holdout.replace(frame=tuple(own * part for own, part in zip(holdout.frame, shrunk, strict=True)))
+
+    lights = tuple(light.replace(holdout=placed(light.holdout)) for light in project.lights)
+    found: Project = project.replace(holdout=placed(project.holdout), lights=lights)
+    return found
 
 
 def on_sensor(

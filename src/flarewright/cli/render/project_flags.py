@@ -16,6 +16,7 @@ from ...io.lens.plate_text import parse_grating, parse_imperfection, parse_plate
 from ...io.project.camera_list import is_camera_name
 from ...io.project.project_file import validation_messages
 from ...io.project.spectrum_text import parse_spectrum
+from ...jobs.frame_list import FramePattern
 from ...model import Art, Holdout, Iris, Lens, Light, Project, ProjectCurve, Scatter
 from ...model.project.camera import Colorspace
 from ...model.project.light import SUN_DEG
@@ -384,7 +385,8 @@ def _holdout(flags: RenderOptions, base: Holdout | None) -> dict[str, Any] | Non
     if flags.holdout is not None and flags.depth is not None:
         raise ProjectError("--holdout and --depth both hide lights; give one of them")
     for flag, path in (("--holdout", flags.holdout), ("--depth", flags.depth)):
-        if path is not None and not path.is_file():
+        # the frames of a sequence are checked when they are chosen
+        if path is not None and not path.is_file() and not FramePattern(str(path)).numbered:
             what = "a grey PNG or EXR image" if flag == "--holdout" else "an EXR depth plate"
             raise ProjectError(f"{flag} {path} {no_file(path)}; give {what} in the picture's frame")
     if flags.holdout is None and flags.depth is None:

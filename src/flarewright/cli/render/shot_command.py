@@ -110,20 +110,14 @@ def _check_movie(options: ShotOptions) -> None:
 
 def _project(options: ShotOptions, plate: PlateSettings | None) -> tuple[Project, list[str]]:
     """Return the project of the options, with their timeline, and remarks."""
-    from .project_flags import project_of
-
     found: list[str] = []
     if plate is not None:
         options, found = _over_plate(options, plate)
-    options, sequences = _sequences(options)
     names = {each.name for each in fields(RenderOptions)} & {each.name for each in fields(ShotOptions)}
     # a render's shutter exposes its PNG, whose view is not that of a film
     same = {name: getattr(options, name) for name in names - {"output", "shutter", "view", "exposure"}}
     timeline = {key: value for key, value in (("fps", options.fps), ("start", options.start)) if value is not None}
     _, project, remarks = project_of_options(RenderOptions(**same, output=Path(options.output)), None, timeline)
-    if sequences:
-        kept = dict(project.holdout) if project.holdout is not None else {}
-        project = project_of({**dict(project), "holdout": {**kept, "image": None, "depth": None, **sequences}})
     if plate is not None:
         found += _other_rate(options, plate, project)
     return project, [*found, *remarks]
@@ -144,22 +138,6 @@ def _other_rate(options: ShotOptions, plate: PlateSettings, project: Project) ->
         f"the plate has {float(own):.6g} frames per second and the project {project.timeline.fps:.6g}; --fps "
         f"{float(own):.6g} takes those of the plate"
     ]
-
-
-def _sequences(options: ShotOptions) -> tuple[ShotOptions, dict[str, str]]:
-    """Return the options without sequences of holdouts, and those sequences; a render knows only single files."""
-    from ...jobs.frame_list import FramePattern
-
-    if options.holdout is not None and options.depth is not None:
-        raise ProjectError("--holdout and --depth both hide lights; give one of them")
-    found: dict[str, str] = {}
-    if options.holdout is not None and FramePattern(str(options.holdout)).numbered:
-        found["image"] = str(options.holdout)
-        options = replace(options, holdout=None)
-    if options.depth is not None and FramePattern(str(options.depth)).numbered:
-        found["depth"] = str(options.depth)
-        options = replace(options, depth=None)
-    return options, found
 
 
 def _over_plate(options: ShotOptions, plate: PlateSettings) -> tuple[ShotOptions, list[str]]:

@@ -115,7 +115,8 @@ _COMMENTED_HOLDOUT = """
 # depth = "depth.exr"   # instead: objects nearer than a light hide it
 # depth_unit_mm = 1000.0
 # invert = true   # white hides
-# overscan = 1.2   # size of the image relative to the picture
+# overscan = 1.2   # size of the image relative to the frame
+# frame = [0.9, 0.9]   # size of the frame relative to a picture with overscan
 """
 
 _COMMENTED_PLATE = """

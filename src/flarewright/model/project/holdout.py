@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import Field, StrictBool, model_validator
 
 from ..base import Frozen
+
+Part = Annotated[float, Field(ge=0.01, le=1.0)]
 
 
 class Holdout(Frozen):
@@ -22,7 +26,10 @@ class Holdout(Frozen):
     invert : bool
         White hides instead of black, as in the alpha channel of a foreground object.
     overscan : float
-        Width and height of the image relative to the picture's, around the same centre.
+        Width and height of the image relative to the frame's, around the same centre.
+    frame : tuple of float
+        Parts of the picture's width and height that the frame has, around the same centre; below 1 in a picture with
+        overscan.
     """
 
     image: str | None = None
@@ -30,6 +37,7 @@ class Holdout(Frozen):
     depth_unit_mm: float = Field(1000.0, gt=0.0, le=1e9)
     invert: StrictBool = False
     overscan: float = Field(1.0, ge=1.0, le=100.0)
+    frame: tuple[Part, Part] = (1.0, 1.0)
 
     @model_validator(mode="after")
     def _one_plate(self) -> Holdout:

@@ -43,16 +43,16 @@ def read_plates(project: Project, light: Light) -> tuple[Plate, ...]:
         A file cannot be read, or its aspect ratio differs from the picture's.
     """
     found = []
-    width, height = project.camera.size_px
     for holdout in (project.holdout, light.holdout):
         if holdout is None:
             continue
         hidden = _hidden(holdout, light)
         rows, columns = hidden.shape
+        width, height = (part * side for part, side in zip(holdout.frame, project.camera.size_px, strict=True))
         if abs(columns * height / (rows * width) - 1.0) > ASPECT_TOLERANCE + 1.0 / min(rows, columns):
             raise ProjectError(
                 f"{holdout.image or holdout.depth}: the holdout is {columns}x{rows}, of another shape than the "
-                f"picture's {width}x{height}; give an image of the picture's shape, larger or smaller"
+                f"picture's {width:.0f}x{height:.0f}; give an image of the picture's shape, larger or smaller"
             )
         found.append((holdout, hidden))
     return tuple(found)
@@ -112,7 +112,8 @@ def _to_plate(lens: Lens, shot: Shot, holdout: Holdout, shape: tuple[int, ...]) 
     place = ideal * here if centre is None else centre[0]
     matrix = np.diag(ideal) if moves is None else moves[0]
     # pixels of the plate per mm, upright
-    zoom = shot.to_pixels[2:] * np.array(shape[::-1]) / (np.array(shot.size_px) * holdout.overscan) * [1.0, -1.0]
+    covered_px = np.array(shot.size_px) * holdout.frame * holdout.overscan
+    zoom = shot.to_pixels[2:] * np.array(shape[::-1]) / covered_px * [1.0, -1.0]
     return zoom[:, None] * matrix, 0.5 * np.array(shape[::-1]) + zoom * place
 
 
