@@ -114,6 +114,12 @@ def test_the_project_file_keeps_all_keys(tmp_path):
 def test_frames_have_exact_times():
     assert frame_rate(23.98) == frame_rate(23.976) == Fraction(24000, 1001)
     assert frame_rate(29.97) == Fraction(30000, 1001)
+    for nominal in (12, 15, 24, 30, 48, 60, 72, 90, 96, 120, 144, 240, 300, 480, 960):
+        exact = Fraction(nominal * 1000, 1001)
+        assert {frame_rate(round(float(exact), digits)) for digits in (2, 3, 6, 12)} == {exact}
+        assert frame_rate(nominal) == nominal
+    assert frame_rate(24.975) == Fraction(25000, 1001)
+    assert frame_rate(0.04) == Fraction(1, 25)
     assert frame_rate(25) == 25
     assert time_of(1025, Timeline(fps=24, start=1001)) == 1.0
     assert time_of(24001, Timeline(fps=23.976, start=1)) == pytest.approx(1001.0, abs=1e-12)

@@ -50,6 +50,33 @@ def test_a_track_of_24_frames_lands_within_a_tenth_of_a_pixel_in_each():
         assert np.hypot(*(np.array(shown(moved, frame)) - place)) < 0.1
 
 
+def test_missing_frames_of_a_track_and_those_outside_it_are_named():
+    """Of tracks without most of their frames, and of the shorter of two tracks, no remark stated them."""
+
+    def words(*tracks, **settings):
+        frames = [np.array(each, dtype=np.float64) for each in tracks]
+        moves = [(k, Track(f"t{k}", each, np.tile((640.0, 360.0), (len(each), 1)))) for k, each in enumerate(frames)]
+        lights = [Light(field_deg=(0, 0))] * len(tracks)
+        return "\n".join(with_tracks(project(**settings).replace(lights=lights), moves)[1])
+
+    assert "track 't0' has no frames 1003-1004, 1006-1007: straight" in words([1001, 1002, 1005, 1008])
+    assert "track 't0' has no frames 1002-1003: straight" in words([1001, 1004])
+    assert "track 't0' has one frame in 2: straight" in words([1001, 1003, 1005])
+    both = words([1001, 1002, 1003, 1004], [1002, 1003])
+    assert both.endswith("track 't1': before frame 1002 and after frame 1003 the light rests")
+    zoom = ProjectCurve(of="zoom", at_s=(0.0, 4 / 24), values=(80.0, 140.0))
+    said = words([1001, 1002], lens="canon-70-200", curves=(zoom,))
+    assert "after frame 1002 the light rests at its field angles, so its pixel moves with the lens" in said
+
+
+def test_a_track_with_the_rate_of_the_shot_in_other_digits_has_no_remark():
+    tracks = (Track("sun", FRAMES, PATH),)
+    found, remarks = timeline_of_tracks(
+        project().replace(timeline=Timeline(fps=23.976, start=1001)), [TrackFile(tracks, "blender", 23.98)]
+    )
+    assert (found.timeline.fps, remarks) == (23.976, [])
+
+
 def test_the_lens_of_each_frame_places_the_light_of_a_zoom():
     zoom = ProjectCurve(of="zoom", at_s=(0.0, 4 / 24), values=(80.0, 140.0))
     moved, _ = with_tracks(project("canon-70-200", curves=(zoom,)), [(0, Track("sun", FRAMES[:5:2], PATH[:5:2]))])

@@ -191,6 +191,14 @@ def test_the_gizmo_does_the_same_with_a_knob_for_each_gain(shot, tmp_path):
     np.testing.assert_allclose(darker, 0.18 + 0.5 * (whole - 0.18 - flare["scatter"] / 1024.0), atol=1e-9)
 
 
+def test_a_rounded_rate_of_the_files_is_the_exact_one(tmp_path):
+    """Other programs state 23.976 as 2997/125."""
+    black = Layer("beauty", np.zeros((9, 16, 3), np.float32), (0, 0, *SIZE), {})
+    stated = {"framesPerSecond": Fraction(2997, 125)}
+    write_exr(tmp_path / "flare.1.exr", [black], SIZE, pixel_type="half", attributes=stated, metadata={})
+    assert parsed(nuke_script(str(tmp_path / "flare.#.exr")).text)[0].knobs["fps"] == "23.976024"
+
+
 def test_frames_rate_and_format_are_those_of_the_files(shot):
     script = nuke_script(shot)
     root, reader = parsed(script.text)[:2]

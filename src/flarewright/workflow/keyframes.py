@@ -153,14 +153,15 @@ def frame_rate(fps: float) -> Fraction:
 
     Examples
     --------
-    >>> frame_rate(23.976), frame_rate(25.0)
-    (Fraction(24000, 1001), Fraction(25, 1))
+    >>> frame_rate(23.976), frame_rate(239.76), frame_rate(25.0)
+    (Fraction(24000, 1001), Fraction(240000, 1001), Fraction(25, 1))
     """
-    for nominal in (24, 30, 48, 60, 120):
-        broadcast = Fraction(nominal * 1000, 1001)
-        # people write 23.976, 23.98, 29.97, 59.94, 119.88
-        if abs(fps - float(broadcast)) < 0.006:
-            return broadcast
+    nominal = round(fps * 1.001)
+    broadcast = Fraction(nominal * 1000, 1001)
+    # people write 23.976, 23.98, 29.97, 59.94, 119.88; rates of no format, such as 24.975, need three decimals
+    known = nominal >= 12 and (nominal % 12 == 0 or nominal % 15 == 0)
+    if nominal > 0 and abs(fps - float(broadcast)) < (0.006 if known else 0.0006):
+        return broadcast
     return Fraction(fps).limit_denominator(1000)
 
 

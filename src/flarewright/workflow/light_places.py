@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import ceil
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from ..errors import ProjectError
 from ..model import Light, LightCurve, LightKey, Project, Timeline
 from ..model.project.animation import FIRST_FRAME, LAST_FRAME, LAST_S
 from ..typing import Floats
-from .keyframes import is_still, last_frame, light_at, project_at, still, time_of
+from .keyframes import frame_rate, is_still, last_frame, light_at, project_at, still, time_of
 
 if TYPE_CHECKING:
     from ..io.tracks.track import Track, TrackFile
@@ -220,14 +221,16 @@ def timeline_of_tracks(
     """
     timeline, remarks = project.timeline, []
     resting = is_still(project)
-    stated = {file.fps for file in files if file.fps is not None}
-    wrong = next((fps for fps in stated if not 0.01 <= fps <= 1000.0), None)
+    rates = [file.fps for file in files if file.fps is not None]
+    wrong = next((fps for fps in rates if not 0.01 <= fps <= 1000.0), None)
     if wrong is not None:
         raise ProjectError(f"the track states {wrong:g} frames per second; correct it, 0.01 to 1000 are possible")
+    # 23.976 and 23.98 are one rate
+    stated = {frame_rate(fps): fps for fps in rates}
     if len(stated) > 1:
-        listed = ", ".join(f"{fps:g}" for fps in sorted(stated))
+        listed = ", ".join(f"{fps:g}" for fps in sorted(stated.values()))
         remarks.append(f"the tracks have {listed} frames per second and the shot {timeline.fps:g}: frames keep numbers")
-    if len(stated) == 1 and (fps := stated.pop()) != timeline.fps:
+    if len(stated) == 1 and frame_rate(fps := rates[0]) != frame_rate(timeline.fps):
         if resting and not fps_given:
             timeline = timeline.replace(fps=fps)
             remarks.append(f"{fps:g} frames per second, as the track states; --fps sets another number")
@@ -289,10 +292,11 @@ def with_tracks(
     finder: LightFinder | None = None
     done, total = 0, sum(len(track.frames) for _, track in moves)
     size = counted_px or project.camera.size_px
+    last = max([last_frame(project), *(ceil(track.frames[-1]) for _, track in moves)])
     for index, track in moves:
         light, label = lights[index], f"track {track.name!r}"
         _check_times(track, project)
-        remarks += _remarks_on(track, size, index)
+        remarks += [*_remarks_on(track, size, index), *_rests(track, project.timeline.start, last, moving)]
         keys: list[LightKey] = []
         beyond = 0
         for k, (frame, place) in enumerate(zip(track.frames, track.from_top_left(size), strict=True)):
@@ -373,11 +377,24 @@ def _remarks_on(track: Track, size_px: tuple[int, int], index: int) -> list[str]
             words += ", whose proportions differ"
         found.append(words)
     steps = np.diff(track.frames)
-    if len(steps) and float(np.median(steps)) == 1.0 and (wide := np.flatnonzero(steps > 1.0)).size:
+    if len(steps) > 1 and steps[0] > 1.001 and np.ptp(steps) == 0.0:
+        found.append(f"{label} has one frame in {steps[0]:g}: straight lines between them")
+    elif (wide := np.flatnonzero(steps > 1.001)).size:
         gaps = [f"{track.frames[k] + 1:g}" + (f"-{track.frames[k + 1] - 1:g}" if steps[k] > 2.0 else "") for k in wide]
         listed = ", ".join(gaps[:_LISTED]) + (f" and {len(gaps) - _LISTED} more gaps" if len(gaps) > _LISTED else "")
         found.append(f"{label} has no frames {listed}: straight lines between their neighbours")
     return found
+
+
+def _rests(track: Track, start: int, last: int, moving: bool) -> list[str]:
+    """Return a remark on frames of the shot, `start` to `last`, in which the track has ended or not begun."""
+    outside = [f"before frame {track.frames[0]:g}"] if track.frames[0] > start else []
+    outside += [f"after frame {track.frames[-1]:g}"] if track.frames[-1] < last else []
+    if not outside:
+        return []
+    # a light that rests before a camera that rests keeps its angles, whatever the zoom
+    pixel = " at its field angles, so its pixel moves with the lens" if moving else ""
+    return [f"track {track.name!r}: {' and '.join(outside)} the light rests{pixel}"]
 
 
 def _direction(slope: Floats) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from ..io.files.door import no_file, shown
 from ..io.images.exr import ExrContents, read_exr, scale_in_exr
 from ..jobs.frame_list import MOST_FRAMES, FramePattern, frames_text
 from ..render.image.compose import add_layer
+from .keyframes import frame_rate
 from .nuke_graph import Node, Passes, flare_nodes, layers_text, nodes_text, quoted
 
 BEAUTY = "beauty"
@@ -247,8 +248,8 @@ def _fps_of(contents: ExrContents) -> Fraction | None:
     value = contents.header.get("framesPerSecond")
     try:
         # releases of the library differ: a fraction, or an object with numerator and denominator
-        return None if value is None else Fraction(getattr(value, "n", value)) / Fraction(getattr(value, "d", 1))
-    except (TypeError, ValueError, ZeroDivisionError):
+        return None if value is None else frame_rate(getattr(value, "n", value) / getattr(value, "d", 1))
+    except (TypeError, ValueError, ZeroDivisionError, OverflowError):
         return None
 
 

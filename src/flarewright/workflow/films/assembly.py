@@ -122,7 +122,9 @@ def assemble_film(
     remarks = []
     if fps is None and first.fps is None:
         remarks.append(f"the frames state no rate; the film has {_FPS:g} frames per second; --fps sets another one")
-    rate = first.fps if fps is None and first.fps is not None else frame_rate(_FPS if fps is None else fps)
+    stated = fps if fps is not None or first.fps is None else float(first.fps)
+    # some programs state 2997/125
+    rate = frame_rate(_FPS if stated is None else stated)
     look = film_look([pattern.path(frame) for frame in numbers], first, layer, view, exposure_stops)
     remarks += [*look.remarks, *_padding(first.size_px, codec)]
     code = (first.header or {}).get("timeCode")
