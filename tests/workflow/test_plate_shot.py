@@ -262,6 +262,17 @@ def test_a_threshold_in_stops_is_one_for_the_whole_shot(plates):
     assert "4 stops above the plate's mean" in found.remarks[0]
 
 
+def test_pixels_outside_the_data_window_of_a_plate_do_not_lower_its_mean(tmp_path):
+    header = {"displayWindow": ((0, 0), (2 * SIZE[0] - 1, 2 * SIZE[1] - 1)), "dataWindow": ((0, 0), (63, 35))}
+    for name, stated in (("whole", {}), ("window", header)):
+        OpenEXR.File(stated, {"RGB": picture()}).write(str(tmp_path / f"{name}.exr"))
+    whole, window = (
+        plate_shot(PlateSettings(str(tmp_path / f"{name}.exr"), stops=4.0), [1]).threshold
+        for name in ("whole", "window")
+    )
+    assert window == whole
+
+
 def test_one_picture_lights_all_frames(plates, tmp_path):
     still = PlateSettings(str(plates / "p.1001.exr"), threshold=1.0)
     result = draw(plates, tmp_path, frames="7-8", plate=still)

@@ -50,6 +50,7 @@ def test_an_exr_file_states_its_rate_time_shape_and_primaries(tmp_path):
     assert str(plate.header["timeCode"]) == str(code)
     assert plate.pixels[2:8, 1:9] == pytest.approx(PIXELS, rel=1e-3)
     assert not plate.pixels[:2].any()
+    assert plate.window == (slice(2, 8), slice(1, 9))
     strange = {"chromaticities": (0.7, 0.3, 0.2, 0.7, 0.1, 0.05, 0.3127, 0.329)}
     OpenEXR.File(strange, {"RGB": PIXELS}).write(str(path))
     assert "neither Rec.709 nor ACEScg" in read_plate(path).remarks[0]

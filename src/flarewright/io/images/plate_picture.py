@@ -50,6 +50,8 @@ class PlatePicture:
     header : dict or None
         Attributes of an EXR file that stay with the picture: timeCode and the camera's.
     remarks : tuple of str
+    window : tuple of slice
+        Rows and columns for which the file has values; the others are black.
     """
 
     pixels: Pixels
@@ -60,6 +62,7 @@ class PlatePicture:
     fps: Fraction | None = None
     header: dict[str, Any] | None = None
     remarks: tuple[str, ...] = ()
+    window: tuple[slice, slice] = (slice(None), slice(None))
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -130,7 +133,20 @@ def _exr(path: Path, layer: str | None, transfer: Transfer | None) -> PlatePictu
         _rate(header.get("framesPerSecond")),
         kept,
         (*damaged, *remarks),
+        _window(header),
     )
+
+
+def _window(header: dict[str, Any]) -> tuple[slice, slice]:
+    """Return the rows and columns of the data window within the display window; all if they do not meet."""
+    (low, high), data = header["displayWindow"], header["dataWindow"]
+    columns, rows = (
+        slice(max(int(data[0][k]) - int(low[k]), 0), min(int(data[1][k]), int(high[k])) - int(low[k]) + 1)
+        for k in range(2)
+    )
+    if rows.stop <= rows.start or columns.stop <= columns.start:
+        return slice(None), slice(None)
+    return rows, columns
 
 
 def _finite(pixels: Pixels) -> tuple[Pixels, tuple[str, ...]]:

@@ -249,7 +249,9 @@ def _threshold(settings: PlateSettings, frames: Sequence[int], first: PlatePictu
         return settings.threshold, []
     step = max(1, -(-len(frames) // _MEAN_FRAMES))
     pictures = [first, *(plate_picture(settings, frame) for frame in frames[step::step])]
-    mean = float(np.mean([log_average_luminance(measured_pixels(plate, settings.highlights)) for plate in pictures]))
+    # a render is cropped to what it shows, and black around it would lower the mean
+    shown = [measured_pixels(plate, settings.highlights)[plate.window] for plate in pictures]
+    mean = float(np.mean([log_average_luminance(pixels) for pixels in shown]))
     if mean <= 0.0:
         raise ProjectError("the plate is black, so a threshold in stops above its mean is none; give --threshold")
     found = mean * 2.0**settings.stops
