@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pickle
 from fractions import Fraction
@@ -29,7 +30,7 @@ from flarewright.errors import FlarewrightError, OutputError, ProjectError
 from flarewright.io.images.exr import read_exr, write_exr
 from flarewright.jobs.answers import Done
 from flarewright.jobs.worker import named
-from flarewright.model import Dirt, Holdout, Iris, Layer
+from flarewright.model import Dirt, Holdout, Iris, Layer, Rectangle, Tabulated
 from flarewright.workflow import shot_frame
 from flarewright.workflow.keyframes import project_at, still
 
@@ -172,6 +173,19 @@ def test_the_header_has_the_standard_attributes_and_the_moment(whole):
     assert '"intensity": 2.5' in contents.metadata["lights"]
     assert '"spectrum": "d65"' in contents.metadata["lights"]
     assert "field_deg = [0.0, 3.0]" in contents.metadata["project"]
+
+
+def test_the_header_states_the_size_and_the_table_of_a_light(tmp_path):
+    table = Tabulated(wavelength_nm=(500.0, 600.0), power=(1.0, 2.0))
+    lights = [
+        Light(field_deg=(1.0, 2.0), diameter_deg=0.5, spectrum=table, distance=2000.0),
+        Light(field_deg=(3.0, 2.0), shape=Rectangle(size_deg=(2.0, 1.0))),
+    ]
+    shot(project(lights=lights, curves=[]), tmp_path / "f.#.exr", frames=[1], processes=1)
+    disc, rectangle = json.loads(read_exr(tmp_path / "f.1.exr").metadata["lights"])
+    assert disc["spectrum"] == {"kind": "table", "wavelength_nm": [500.0, 600.0], "power": [1.0, 2.0]}
+    assert (disc["diameter_deg"], disc["distance_mm"], "shape" in disc) == (0.5, 2000.0, False)
+    assert (rectangle["diameter_deg"], rectangle["shape"]["size_deg"]) == (0.0, [2.0, 1.0])
 
 
 def test_the_scale_is_that_of_the_brightest_light_at_any_time(whole):

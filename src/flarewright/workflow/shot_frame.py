@@ -22,7 +22,7 @@ from ..io.project.spectrum_text import spectrum_text
 from ..jobs.frame_list import FramePattern
 from ..jobs.worker import WRITING
 from ..measure.replay.measured_project import is_measured, render_measured
-from ..model import Layer, Project
+from ..model import Layer, Light, Project
 from ..render.image.ocio_space import config_digest, in_file_space
 from ..render.remarks import BLACK, DARK
 from ..render.render import Rendering
@@ -310,18 +310,13 @@ def _write(plan: ShotPlan, frame: int, moments: tuple[Project, ...], rendering: 
     # the moment in the middle stands for the frame
     shown = moments[len(moments) // 2]
     project = rendering.project
-    # a table of a spectrum has no short text
-    lights = [
-        {"field_deg": light.field_deg, "intensity": light.intensity, "spectrum": spectrum_text(light.spectrum)}
-        for light in shown.lights
-    ]
     metadata = {
         "version": __version__,
         "project": project_text(shown, folder=plan.path(frame).parent),
         "digest": digest,
         "frame": str(frame),
         "subframes": str(len(moments)),
-        "lights": json.dumps(lights),
+        "lights": json.dumps([_light_facts(light) for light in shown.lights]),
     }
     attributes = shot_attributes(
         frame=frame, fps=frame_rate(plan.project.timeline.fps), shutter_s=plan.open_s, **_facts(shown)
@@ -355,6 +350,21 @@ def _write(plan: ShotPlan, frame: int, moments: tuple[Project, ...], rendering: 
             # its project starts at its own folder
             facts = {**metadata, "project": project_text(shown, folder=over.parent)}
             write_comp(over, plan.plate, frame, rendering.layers, project, facts, attributes)
+
+
+def _light_facts(light: Light) -> dict[str, Any]:
+    """Return what the header states of a light."""
+    # a table has no short text
+    spectrum = spectrum_text(light.spectrum) or light.spectrum.model_dump(mode="json")
+    facts: dict[str, Any] = {
+        "field_deg": light.field_deg, "intensity": light.intensity, "spectrum": spectrum,
+        "diameter_deg": light.diameter_deg,
+    }  # fmt: skip
+    if light.shape is not None:
+        facts["shape"] = light.shape.model_dump(mode="json")
+    if light.distance is not None:
+        facts["distance_mm"] = light.distance
+    return facts
 
 
 def _facts(project: Project) -> dict[str, Any]:
