@@ -83,6 +83,10 @@ def test_the_stop_moves_and_keeps_its_size():
         ),
         (["move-stop", "nikon-28-75", "-o", "a.toml", "--row", "24"], "f-numbers go from 0.3 to 256"),
         (
+            ["resize", "heliar-tronnier", "-o", "a.toml", "--ghost", "8-6", "--height", "1.1", "--fstop", "1"],
+            "f/1 is faster than Heliar-Tronnier 100 mm f/3.5 opens (f/3.5)",
+        ),
+        (
             ["resize", "heliar-tronnier", "-o", "a.toml", "--ghost", "8-6", "--height", "0.2", "--fstop", "200"],
             "f-numbers go from 0.3 to 256",
         ),
@@ -155,6 +159,29 @@ def test_a_zoom_whose_last_group_moves_is_not_resized():
     rounded = lens.replace(positions=tuple(p.replace(gaps=((1, 10.0), (4, 5.0 - 1e-3 * k)))
                                            for k, p in enumerate(lens.positions)))  # fmt: skip
     assert resize_ghost(rounded, (1, 0), 1.1).lens.positions == rounded.positions
+
+
+def test_a_resized_lens_states_no_focal_length_of_the_old_one():
+    """A remark then compared the new lens with the patent, and a zoom was set by focal lengths that it has not."""
+    lens = zoom(((1, 10.0),), stated_focal_length=33.0)
+    positions = tuple(
+        position.replace(gaps=((1, gap),), f_number=f_number)
+        for position, gap, f_number in zip(lens.positions, (10.0, 9.9), (8.0, 9.0), strict=True)
+    )
+    efls = [first_order(at_position(lens, position)).efl for position in positions]
+    positions = tuple(one.replace(focal_length=0.99 * efl) for one, efl in zip(positions, efls, strict=True))
+    lens = lens.replace(positions=(*positions, positions[1].replace(name="near", focus_distance=1e6)))
+    bent = resize_ghost(lens, (1, 0), 1.1).lens
+    assert bent.stated_focal_length is None
+    for before, after in zip(lens.positions[:2], bent.positions[:2], strict=True):
+        old, new = first_order(at_position(lens, before)), first_order(at_position(bent, after))
+        assert after.focal_length == pytest.approx(0.99 * new.efl)
+        assert abs(new.efl / old.efl - 1.0) > 1e-3
+        assert new.stop_semi_diameter == pytest.approx(old.stop_semi_diameter)
+    assert bent.positions[2].focal_length == bent.positions[1].focal_length
+    smaller = resize_all(lens, 0.5).lens
+    assert smaller.stated_focal_length == 33.0
+    assert [position.f_number for position in smaller.positions[:2]] == pytest.approx([16.0, 18.0])
 
 
 def test_the_sensor_stays_where_it_is_when_a_rear_stop_moves():

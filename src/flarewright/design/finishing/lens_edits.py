@@ -13,7 +13,7 @@ from ...kernels.design import ghosts as columns
 from ...model import Lens, Position, Stop, Surface
 from ...optics.lens.paraxial import FirstOrder, first_order
 from ...optics.lens.zoom import at_position, gaps_without_row
-from ...render.scene.resolve import complete_lens
+from ...render.scene.resolve import check_opens, complete_lens
 from ...sentences import INVALID, validation_sentences
 from ...typing import Floats
 from ..problem.ghosts import evaluate
@@ -76,13 +76,14 @@ def resize_ghost(
     Returns
     -------
     Resized
-        With the solution of nearest curvature.
+        With the solution of nearest curvature. The focal length that the source states is left out; those of zoom
+        positions change as the traced ones do.
 
     Raises
     ------
     ProjectError
-        When the lens has no such ghost, no curvature of that row gives this size, or the sensor of a zoom has another
-        distance in each position.
+        When the lens has no such ghost, does not open to the f-number, no curvature of that row gives this size, or
+        the sensor of a zoom has another distance in each position.
     LensError
         When the lens forms no image any more, or a lens file cannot hold its f-number.
     """
@@ -107,9 +108,9 @@ def resize_ghost(
     vector[at] = curvature
     rows = list(lens.rows)
     rows[row] = surface.replace(curvature=curvature)
-    bent = lens.replace(rows=tuple(rows), sensor_distance=order.sensor_distance)
+    bent = lens.replace(rows=tuple(rows), sensor_distance=order.sensor_distance, stated_focal_length=None)
     # the same stop diameter gives another f-number when the lens in front of the stop changes
-    bent = complete_lens(opened_to(bent, float(vector[0])))
+    bent = complete_lens(_with_positions(lens, opened_to(bent, float(vector[0]))))
     return Resized(bent, row, structure.pairs, before, _ghosts(structure, vector, entrance))
 
 
@@ -125,8 +126,41 @@ def _check_one_sensor(lens: Lens, order: FirstOrder) -> None:
             )
 
 
+def _with_positions(before: Lens, after: Lens) -> Lens:
+    """Return a changed lens whose positions have the focal lengths of its rows, and f-numbers of its stop.
+
+    Raises
+    ------
+    LensError
+        When it forms no image at a position, or a lens file cannot hold the f-number.
+    """
+    if not before.positions:
+        return after
+    share = first_order(after).stop_semi_diameter / first_order(before).stop_semi_diameter
+    # positions of one focal length are settings of the focus, and keep a common one
+    ratios: dict[float, float] = {}
+    positions = []
+    for position in sorted(before.positions, key=lambda each: each.focus_distance is not None):
+        old, new = at_position(before, position), at_position(after, position)
+        changes = {}
+        if position.focal_length is not None:
+            ratio = ratios.setdefault(position.focal_length, first_order(new).efl / first_order(old).efl)
+            if ratio <= 0.0:
+                raise LensError(f"{after.name} forms no image at {position.name!r} any more; change less")
+            changes["focal_length"] = position.focal_length * ratio
+        if position.f_number is not None:
+            opened = opened_to(new, 2.0 * share * first_order(old).stop_semi_diameter)
+            changes["f_number"] = opened.f_number
+        positions.append(position.replace(**changes))
+    names = [position.name for position in before.positions]
+    positions.sort(key=lambda each: names.index(each.name))
+    found: Lens = after.replace(positions=tuple(positions))
+    return found
+
+
 def _numbers_of(lens: Lens, f_number: float | None) -> tuple[Structure, FirstOrder, Floats, float]:
     """Return structure, first-order numbers, vector and diameter of the entrance of a lens."""
+    check_opens(lens, f_number)
     structure, order = structure_of(lens), first_order(lens, f_number)
     entrance = 2.0 * (getattr(lens.rows[0], "semi_diameter", None) or order.entrance_pupil_diameter)
     return structure, order, vector_of(lens, 2.0 * order.stop_semi_diameter, order.sensor_distance), entrance
@@ -176,7 +210,8 @@ def resize_all(
     Raises
     ------
     ProjectError
-        When the stop is the first row, or the first surface would be wider than its sphere.
+        When the stop is the first row, the lens does not open to the f-number, or the first surface would be wider
+        than its sphere.
     LensError
         When a lens file cannot hold the f-number.
 
@@ -205,7 +240,8 @@ def resize_all(
         changed = lens.replace(rows=(front.replace(semi_diameter=0.5 * entrance), *lens.rows[1:]))
         if f_number is not None:
             changed = changed.replace(f_number=f_number)
-    return Resized(complete_lens(changed), row, structure.pairs, before, _ghosts(structure, vector, entrance))
+    resized = complete_lens(_with_positions(lens, changed))
+    return Resized(resized, row, structure.pairs, before, _ghosts(structure, vector, entrance))
 
 
 def _nearest_root(function: Callable[[Floats], Floats], start: float, largest: float) -> float | None:
