@@ -244,6 +244,25 @@ def test_removing_what_is_not_there_suggests_a_near_name(files, state):
         remove_lens("tessar-brendel")
 
 
+def test_options_for_lenses_that_are_there_are_reported(files, state, tmp_path):
+    """They were dropped without a word: the files are not read again."""
+    sequence = tmp_path / "a.seq"
+    sequence.write_text(
+        "LEN NEW\nEPD 20\nDIM M\nS0 0 1E20\nS1 50 5 517000.642\n STO\nS2 -50 2\nS3 -150 45\nSI 0 0\nGO\n"
+    )
+    places = [files / "Petzval.lens", files / "Triplet.csv", sequence]
+    first = {"maker": "Me", "apertures": "diameters", "first_column": "radii"}
+    assert add_lenses(places, **first).remarks == ()
+    words = "has no effect on lenses that the library has:"
+    again = add_lenses(places, **first).remarks
+    assert [remark.partition(";")[0] for remark in again] == [
+        f"--apertures {words} petzval", f"--first-column {words} a",
+    ]  # fmt: skip
+    other = add_lenses(places, maker="Other").remarks
+    assert [remark.partition(";")[0] for remark in other] == [f"--maker {words} petzval, triplet, a"]
+    assert {record.maker for record in own_library().records} == {"Me"}
+
+
 def test_options_without_effect_are_reported(files, state):
     found = add_lenses([files / "Triplet.csv"], apertures="diameters", first_column="radii")
     assert found.remarks == (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tomllib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from hashlib import sha256
@@ -42,6 +42,8 @@ from .lens_record import record_of_lens
 from .own_lenses import kept_record, library_lock, own_library
 
 _PICTURE_DIGITS = 16
+# lenses that a remark names
+_LISTED = 5
 
 
 @dataclass(frozen=True)
@@ -143,9 +145,33 @@ def add_lenses(
         if value != "auto" and suffix not in kinds
     ]
     # the index of what was added, so that the first search need not make it
-    damaged = [remark for remark in own_library().remarks if "index" in remark]
+    library = own_library()
+    damaged = [remark for remark in library.remarks if "index" in remark]
     added = _joined(one_by_one)
-    return replace(added, remarks=(*damaged, *added.remarks, *unused))
+    makers = {record.name: record.maker for record in library.records}
+    return replace(added, remarks=(*damaged, *added.remarks, *unused, *_unread(added, reading, makers)))
+
+
+def _unread(added: Addition, reading: _Reading, makers: Mapping[str, str]) -> list[str]:
+    """Return remarks on options that have no effect on files that the library had before."""
+    made = {record.name for record in added.added}
+    known = [(file, name) for file, name in added.known if name not in made]
+    # an addition that resumes gives the same maker again
+    other = [name for _, name in known if reading.maker is not None and makers.get(name) != reading.maker]
+    of_kind = {suffix: [name for file, name in known if file.lower().endswith(suffix)] for suffix in (".lens", ".seq")}
+    found = []
+    for flag, names in (
+        ("--maker", other),
+        ("--apertures", of_kind[".lens"] if reading.apertures != "auto" else []),
+        ("--first-column", of_kind[".seq"] if reading.first_column is not None else []),
+    ):
+        if names:
+            listed = ", ".join(names[:_LISTED]) + (f" and {len(names) - _LISTED} more" if len(names) > _LISTED else "")
+            found.append(
+                f"{flag} has no effect on lenses that the library has: {listed}; to change them, flarewright library "
+                "remove NAME, then add them again"
+            )
+    return found
 
 
 def _joined(additions: Sequence[Addition]) -> Addition:
