@@ -60,7 +60,10 @@ def test_solve_writes_lenses_that_render_and_resume_goes_on(folder, capsys):
                 "--no-png", "-o", "a.exr"]) == 0  # fmt: skip
     capsys.readouterr()
     assert run(["design", "resume", "found", "--searches", "200", "--lenses", "1", "--json"]) == 0
-    again = json.loads(capsys.readouterr().out)
+    printed = capsys.readouterr()
+    again = json.loads(printed.out)
+    assert len(reported["lenses"]) == 2
+    assert "lens-2.png, lens-2.toml in found are of an earlier search, and not in this report" in printed.err
     assert again["searches"] > reported["searches"]
     assert again["lenses"][0]["cost"] <= reported["lenses"][0]["cost"] * (1 + 1e-9)
 

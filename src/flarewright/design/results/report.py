@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from math import atan2, cos, sin
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,9 @@ from ..solvers.search_state import write_state
 
 # largest error of place or size of a ghost, mm: met, nearly met
 MET, NEARLY = 0.005, 0.3
+_LENS_FILE = re.compile(r"lens-[1-9]\d*\.(?:toml|png|colors\.toml)")
+# files that a remark names
+_LISTED = 6
 
 
 def verdict(outcome: Outcome | None, proven: tuple[Obstacle, ...] = (), conflict: tuple[Breach, ...] = ()) -> str:
@@ -155,15 +159,19 @@ def write_folder(
     target = target_pictures(problem, project)
     wanted = png_bytes(target[0])
     lenses = []
+    written: set[str] = set()
     for number, one in enumerate(found, 1):
         write_lens(one.lens, folder / f"lens-{number}.toml")
+        written.add(f"lens-{number}.toml")
         hued = _color_project(project, problem, one, folder / f"lens-{number}.toml")
         if hued is not None:
             path = folder / f"lens-{number}.colors.toml"
             write_text_atomically(path, project_text(hued, folder=folder), newline="\n")
+            written.add(path.name)
             remarks.append(f"{path.name} has the target colours of lens-{number}: flarewright design colors {path}")
         pictures = found_pictures(one, problem, project)
         draft = _draft(folder / f"lens-{number}.png", one, project, remarks)
+        written |= {f"lens-{number}.png"} if draft else set()
         shown = [("target", wanted), ("found", png_bytes(pictures[0])), *([("draft render", draft)] if draft else [])]
         lenses.append((one, shown))
     data = search_summary(state, found, problem, proven, conflict)
@@ -171,7 +179,18 @@ def write_folder(
         "design", title="Flarewright design", data=data, lenses=lenses, names=problem.objective.names, target=wanted
     )
     write_text_atomically(folder / "report.html", page, newline="\n")
-    return remarks
+    return [*remarks, *_of_earlier_searches(folder, written)]
+
+
+def _of_earlier_searches(folder: Path, written: set[str]) -> list[str]:
+    """Return a remark on files of lenses that a search with more of them has left in the folder."""
+    old = sorted(path.name for path in folder.glob("lens-*") if _LENS_FILE.fullmatch(path.name))
+    old = [name for name in old if name not in written]
+    if not old:
+        return []
+    listed = ", ".join(old[:_LISTED]) + (f" and {len(old) - _LISTED} more" if len(old) > _LISTED else "")
+    are = "is" if len(old) == 1 else "are"
+    return [f"{listed} in {folder} {are} of an earlier search, and not in this report; delete what you do not need"]
 
 
 def write_checkpoint(folder: Path, project: Project, state: PoolState, name: str | None = None) -> None:
