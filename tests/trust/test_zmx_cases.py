@@ -101,6 +101,24 @@ def test_terms_of_an_extended_asphere_count_in_both_places(read):
     assert "surface 1: PARM has no meaning for the type STANDARD; left out" in remarks
 
 
+def test_every_number_of_a_shape_has_an_effect_or_a_remark(read):
+    """An odd asphere used XDAT beside a remark that it had no meaning; others dropped numbers without a word."""
+
+    def lens(kind, *numbers):
+        return singlet(front=(f"TYPE {kind}", "CURV 0.02", "DISZ 6", N_BK7, "DIAM 10", *numbers))
+
+    found, remarks = read(lens("ODDASPHE", "PARM 4 1e-5", "XDAT 1 5", "XDAT 2 1", "XDAT 7 1e-4"))
+    assert found.rows[0].terms == {4: 1e-5}
+    assert "surface 1: XDAT has no meaning for the type ODDASPHE; left out" in remarks
+    both = ("PARM 4 1e-5", "XDAT 1 5", "XDAT 2 1", "XDAT 6 2e-5")
+    assert "different terms in PARM and in XDAT" in refusal(read, lens("XOSPHERE", *both))
+    found, remarks = read(lens("XASPHERE", "XDAT 1 2", "XDAT 2 1", "XDAT 4 -2e-5", "XDAT 5 1e-8"))
+    assert found.rows[0].terms == {4: -2e-5}
+    assert "surface 1: XDAT 5 lies beyond the number of terms that XDAT 1 states; left out" in remarks
+    _, remarks = read(lens("BICONICX", "PARM 1 50", "PARM 3 1e-5"))
+    assert "surface 1: PARM 3 is no parameter of BICONICX; left out" in remarks
+
+
 @pytest.mark.parametrize(("kind", "more"), [("BINARY_2", "XDAT 6 -2e-5"), ("FRESNELS", "PARM 1 0")])
 def test_surfaces_that_are_not_supported_are_one_sentence(read, kind, more):
     message = refusal(read, singlet(front=(f"TYPE {kind}", "CURV 0.02", "DISZ 6", N_BK7, "DIAM 10", more)))

@@ -177,6 +177,9 @@ def _shape(block: Block, mm: float, found: Text) -> dict[str, object]:
     for key, numbers in (("PARM", block.parameters), ("XDAT", block.extra)):
         if key not in used and any(numbers.values()):
             found.remarks.append(f"{where}: {key} has no meaning for the type {block.kind[:40]}; left out")
+    last = {"BICONICX": 2, "TOROIDAL": 8}.get(block.kind, math.inf)
+    if beyond := [f"PARM {n}" for n, value in block.parameters.items() if n > last and value]:
+        found.remarks.append(f"{where}: {', '.join(beyond[:3])} is no parameter of {block.kind}; left out")
     if block.kind == "STANDARD":
         return {"curvature": curvature, "conic": conic}
     if block.kind == "COORDBRK":
@@ -201,6 +204,10 @@ def _shape(block: Block, mm: float, found: Text) -> dict[str, object]:
         unit = block.extra.get(2, 1.0) or 1.0
         most = min(max(int(block.extra.get(1, 0.0)), 0), MOST_SURFACES)
         terms = {n: block.extra.get(n + 2, 0.0) / unit ** (2 * n) for n in range(1, most + 1)}
+        if beyond := [f"XDAT {n}" for n, value in block.extra.items() if n > most + 2 and value]:
+            found.remarks.append(
+                f"{where}: {', '.join(beyond[:3])} lies beyond the number of terms that XDAT 1 states; left out"
+            )
         # other programs write the terms as those of an even asphere
         plain = {n: value for n, value in block.parameters.items() if n > 0 and value}
         if plain and any(terms.values()) and any(terms.get(n) != value for n, value in plain.items()):
@@ -222,12 +229,17 @@ def _shape(block: Block, mm: float, found: Text) -> dict[str, object]:
 
 def _even_and_odd(block: Block, problems: list[str]) -> tuple[dict[int, float], dict[int, float]]:
     """Return an odd asphere's terms: even ones by half the power of r, odd ones by the power."""
-    where, unit = f"surface {block.number}", block.extra.get(2, 1.0) or 1.0
-    powers = {n - 2: value / unit ** (n - 2) for n, value in block.extra.items() if n > 2}
-    if beyond := [n + 2 for n, value in powers.items() if value and n > block.extra.get(1, 0.0)]:
+    where = f"surface {block.number}"
+    # an odd asphere has its terms in PARM only
+    extra = block.extra if block.kind == "XOSPHERE" else {}
+    unit = extra.get(2, 1.0) or 1.0
+    powers = {n - 2: value / unit ** (n - 2) for n, value in extra.items() if n > 2}
+    if beyond := [n + 2 for n, value in powers.items() if value and n > extra.get(1, 0.0)]:
         problems.append(f"{where}: XDAT {beyond[0]} lies beyond the number of terms that XDAT 1 states")
-    powers |= {n: value for n, value in block.parameters.items() if n > 0 and value}
-    powers = {n: value for n, value in powers.items() if value}
+    plain = {n: value for n, value in block.parameters.items() if n > 0 and value}
+    if any(powers.values()) and any(powers.get(n) != value for n, value in plain.items()):
+        problems.append(f"{where} has different terms in PARM and in XDAT: remove those that are wrong")
+    powers = {n: value for n, value in (powers | plain).items() if value}
     if 1 in powers:
         problems.append(f"{where} has a term of r, a tip without a normal on the axis, which is not supported")
     odd = {n: value for n, value in powers.items() if n % 2 and n > 1}
