@@ -10,7 +10,7 @@ from planted_run import FOCAL, LARGEST, SIZE, SMALL, SMALL_ANGLES, SMALL_GHOSTS,
 
 from flarewright.cli.app import run as command
 from flarewright.io.measurement.ghost_model_file import read_ghost_model
-from flarewright.io.measurement.merged import read_run, write_frame
+from flarewright.io.measurement.merged import read_frame, read_run, write_frame
 from flarewright.measure.core.frame_reading import read_views
 from flarewright.measure.core.parameters import rescaled
 from flarewright.measure.detection.settings import DetectionSettings
@@ -233,6 +233,28 @@ def test_more_than_every_constellation_left_out_is_reported(folder, capsys):
     assert "--every 50 leaves 1 of 9 constellations" in reported
     assert "at most --every 4" in reported
     assert len(read_views(folder, read_run(folder), 4)) == 3
+
+
+@pytest.mark.parametrize(
+    ("variance", "which", "words"),
+    [
+        (0.0, slice(1), "has a variance of 0 or less in 1 pixel, and"),
+        (-1.0, slice(None), "has a variance of 0 or less in 9600 pixels"),
+        (np.inf, slice(None), "every pixel of every frame counts as clipped"),
+    ],
+)
+def test_frames_without_noise_or_measured_pixels_are_refused(tmp_path, capsys, variance, which, words):
+    """Weights became infinite, and `find` ended in an error of linear algebra; or it found no ghost in nothing."""
+    run = write_small(tmp_path, ())
+    for info in run.frames:
+        frame = read_frame(tmp_path, info)
+        given = frame.variance.copy()
+        given[which, which] = variance
+        write_frame(tmp_path, replace(frame, variance=given))
+    assert command(["measure", "find", str(tmp_path)]) == 2
+    reported = capsys.readouterr().err
+    assert words in reported
+    assert len(reported.strip().splitlines()) == 1
 
 
 def test_a_frame_of_another_size_is_named(tmp_path, capsys):

@@ -14,7 +14,7 @@ import numpy as np
 from ...errors import FileError, FlarewrightError, OutputError
 from ...model.layer import Layer
 from ...model.measurement.capture import FrameInfo, MergedFrame, MergedRun
-from ...sentences import summary
+from ...sentences import count, summary
 from ..files.atomic_write import write_text_atomically
 from ..files.text_file import read_json
 from ..files.type_slips import record_of
@@ -88,7 +88,7 @@ def read_frame(folder: Path, info: FrameInfo) -> MergedFrame:
     Raises
     ------
     FlarewrightError
-        When the file is missing, damaged or not a merged frame.
+        When the file is missing, damaged or not a merged frame, or pixels have no variance above 0.
     """
     path = folder / info.file
     remedy = "merge again with flarewright measure merge"
@@ -101,6 +101,12 @@ def read_frame(folder: Path, info: FrameInfo) -> MergedFrame:
     if not {_RADIANCE, _VARIANCE} <= layers.keys() or layers[_RADIANCE].shape != layers[_VARIANCE].shape:
         raise FlarewrightError(
             f"{path} has no radiance with a variance, so it is no merged frame: remove it and {remedy}"
+        )
+    # such a pixel would have an infinite weight
+    if (exact := np.count_nonzero((layers[_VARIANCE] <= 0.0).any(axis=2))) > 0:
+        raise FlarewrightError(
+            f"{path} has a variance of 0 or less in {count(exact, 'pixel')}, and every measured value has noise: "
+            f"remove it and {remedy}"
         )
     gain = np.float32(info.gain)
     return MergedFrame(info, layers[_RADIANCE] / gain, layers[_VARIANCE] / gain**2)

@@ -7,6 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from ...errors import FlarewrightError
 from ...io.measurement.merged import read_frame
 from ...model.measurement.capture import FrameInfo, MergedRun
@@ -22,7 +24,7 @@ def read_views(
     Raises
     ------
     FlarewrightError
-        When a frame cannot be read, or fewer than three remain.
+        When a frame cannot be read, fewer than three remain, or nothing was measured in any of them.
     """
     largest = max((abs(each.constellation_deg) for each in run.frames), default=0.0)
     rolls: dict[float, list[FrameInfo]] = {}
@@ -31,7 +33,13 @@ def read_views(
     check_every([len(turned) for turned in rolls.values()], every, folder)
     frames = [each for turned in rolls.values() for each in turned[::every]]
     frames.sort(key=lambda each: (each.constellation_deg, each.roll_deg))
-    return views_of(map_batched(partial(read_frame, folder), frames, pool=pool), largest)
+    views = views_of(map_batched(partial(read_frame, folder), frames, pool=pool), largest)
+    if not any(np.isfinite(view.variance).any() for view in views):
+        raise FlarewrightError(
+            f"{folder}: every pixel of every frame counts as clipped (its variance is not finite), so nothing is "
+            "measured: merge again with shorter exposures, or correct the white level in camera.json"
+        )
+    return views
 
 
 def check_every(sizes: Sequence[int], every: int, where: Path) -> None:
