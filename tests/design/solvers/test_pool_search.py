@@ -21,7 +21,7 @@ from flarewright.errors import FlarewrightError, ProjectError
 from flarewright.kernels.design.arguments import Effort, FreeVariables, GhostAims, LensStructure
 from flarewright.kernels.design.ghosts import RADIUS, REACH, REACH_THESIS
 from flarewright.kernels.design.local_search import polish_many
-from flarewright.model import Design, GhostTarget, Light, Project, QuarterWave
+from flarewright.model import Design, GhostTarget, Light, Plate, Project, QuarterWave
 from flarewright.model.project.design import Bounds
 from flarewright.render.scene.resolve import complete_lens, load_lens
 
@@ -240,6 +240,19 @@ def test_fixed_rows_stay():
         assert vector[1 + row] == surface.thickness
         assert vector[1 + 9 + row] == surface.curvature
         assert vector[1 + 18 + row] == surface.medium.n_d
+
+
+def test_fixed_rows_count_without_the_filter():
+    """Row 0 was the front of the filter; the remark on catalogue glasses, and scatter, count the lens' rows."""
+    given = project(structure="lens", fixed_rows=(0, 8))
+    plain, _ = problem_of(given)
+    behind, settled = problem_of(given.replace(filter=Plate(glass="N-BK7", thickness=2.0)))
+    assert plain.fixed_rows == (0, 8)
+    assert behind.fixed_rows == (2, 10)
+    assert settled.lens.rows[2].curvature == settled.opened.lens.rows[0].curvature
+    covered = given.replace(camera=given.camera.replace(cover_glass=Plate(glass="N-BK7", thickness=1.0)))
+    with pytest.raises(ProjectError, match="rows are 0 to 8"):
+        problem_of(covered.replace(design=covered.design.replace(fixed_rows=(9,))))
 
 
 def test_fixed_rows_keep_their_asphere_and_their_coating():

@@ -8,8 +8,9 @@ from math import hypot, radians, tan
 import numpy as np
 
 from ...errors import ProjectError
-from ...model import Lens, Project, Surface
+from ...model import Project, Surface
 from ...model.project.design import Design, GhostTarget
+from ...optics.lens.plane_plates import FILTER_ROWS
 from ...render.scene.resolve import ResolvedProject, resolve_project
 from ...typing import Floats
 from .glass_list import glass_list
@@ -77,7 +78,7 @@ def problem_of(project: Project) -> tuple[Problem, ResolvedProject]:
     return Problem(
         objective, found, bounds,
         stop_diameter=float(vector[0]) if design.brightness == "stop" else None,
-        fixed=vector if design.fixed_rows else None, fixed_rows=_checked(design, structure, settled.lens),
+        fixed=vector if design.fixed_rows else None, fixed_rows=_fixed_rows(design, settled),
         begin_with=((structure, vector),) if changed and structure in found else (), glasses=glasses,
         own_rows=settled.lens.rows,
         traced=design.quality == "final",
@@ -124,17 +125,19 @@ def _enough(surfaces: int, wanted: int) -> int:
     return next(count for count in range(surfaces, 1000) if structures(count, wanted, most=1))
 
 
-def _checked(design: Design, structure: Structure, lens: Lens) -> tuple[int, ...]:
+def _fixed_rows(design: Design, settled: ResolvedProject) -> tuple[int, ...]:
+    """Return the rows that stay unchanged, counted with those of a filter; the design counts the lens' own."""
+    own, ahead = settled.opened.lens.rows, 0 if settled.project.filter is None else FILTER_ROWS
     for row in design.fixed_rows:
-        if not 0 <= row < structure.rows:
-            raise ProjectError(f"design.fixed_rows has {row}, but the lens' rows are 0 to {structure.rows - 1}")
-        surface = lens.rows[row]
+        if not 0 <= row < len(own):
+            raise ProjectError(f"design.fixed_rows has {row}, but the lens' rows are 0 to {len(own) - 1}")
+        surface = settled.lens.rows[row + ahead]
         if design.quality == "final" and isinstance(surface, Surface) and not _is_centred_sphere(surface):
             raise ProjectError(
                 f"design.fixed_rows has {row}, which is no centred sphere, and the rays of design.quality "
                 f'"final" meet spheres only; choose "draft", or free row {row}'
             )
-    return design.fixed_rows
+    return tuple(row + ahead for row in design.fixed_rows)
 
 
 def _is_centred_sphere(surface: Surface) -> bool:

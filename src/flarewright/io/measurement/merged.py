@@ -103,7 +103,7 @@ def read_frame(folder: Path, info: FrameInfo) -> MergedFrame:
             f"{path} has no radiance with a variance, so it is no merged frame: remove it and {remedy}"
         )
     # such a pixel would have an infinite weight
-    if (exact := np.count_nonzero((layers[_VARIANCE] <= 0.0).any(axis=2))) > 0:
+    if (exact := int((layers[_VARIANCE] <= 0.0).any(axis=2).sum())) > 0:
         raise FlarewrightError(
             f"{path} has a variance of 0 or less in {count(exact, 'pixel')}, and every measured value has noise: "
             f"remove it and {remedy}"

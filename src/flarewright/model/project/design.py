@@ -144,7 +144,8 @@ class Design(Frozen):
     structure : {"any", "lens"}
         lens: the sequence of glass, air and stop is that of the project's lens.
     fixed_rows : tuple of int
-        Rows that keep shape, thickness, glass and coating of the project's lens (with structure = "lens").
+        Rows that keep shape, thickness, glass and coating of the project's lens (with structure = "lens"), counted
+        without its filter.
     signed : bool
         Whether an inverted ghost differs from an upright one.
     weights : {"relative", "absolute"}

@@ -10,6 +10,8 @@ from .paraxial import first_order
 FILTER_GAP, COVER_GAP = 5.0, 0.5
 # a sensor lies behind the last vertex: a cover glass on the sensor is a nanometre in front of it
 CEMENTED_GAP = 1e-6
+# rows of a filter in front of the rows of the lens
+FILTER_ROWS = 2
 
 
 def _faces(plate: Plate, medium: Medium, behind: float) -> tuple[Surface, Surface]:

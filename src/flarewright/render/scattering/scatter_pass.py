@@ -24,6 +24,7 @@ from ...kernels.scattering.single_scatter import (
 from ...model import Layer, Lens
 from ...model.lens.scatter import Scatter
 from ...optics.lens.paths import direct_path
+from ...optics.lens.plane_plates import FILTER_ROWS
 from ...optics.rays.pack import PackedLens, pack_lens
 from ...optics.scattering.brdf import ScatterTables, scatter_tables
 from ...optics.scattering.internal_beams import Beams, trace_beams
@@ -39,8 +40,6 @@ MOST_WAVELENGTHS = 3
 FIRST_RING, FIRST_RING_MM = 0.25, 0.007
 # share of scattered light from which a remark reports that ghosts are drawn without that loss
 REPORTED_SHARE = 2e-3
-# rows of a filter in front of the rows of the lens
-FILTER_ROWS = 2
 # wavelength with the most scatter
 SHORTEST_NM = 400.0
 
