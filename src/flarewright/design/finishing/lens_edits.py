@@ -10,9 +10,9 @@ import numpy as np
 
 from ...errors import LensError, ProjectError
 from ...kernels.design import ghosts as columns
-from ...model import Lens, Position, Stop, Surface
+from ...model import Lens, Stop, Surface
 from ...optics.lens.paraxial import FirstOrder, first_order
-from ...optics.lens.zoom import at_position, gaps_without_row
+from ...optics.lens.zoom import at_position, positions_without_row
 from ...render.scene.resolve import check_opens, complete_lens
 from ...sentences import INVALID, validation_sentences
 from ...typing import Floats
@@ -325,14 +325,8 @@ def move_stop(lens: Lens, row: int) -> Lens:
     try:
         moved = lens.replace(
             rows=tuple(rows), coating_presets=presets, elements=(), f_number=1.0, sensor_distance=distance,
-            positions=_without_row(lens, old),
+            positions=positions_without_row(lens, old),
         )  # fmt: skip
     except INVALID as error:
         raise LensError(f"the stop of {lens.name} cannot move to row {row}: {validation_sentences(error)[0]}") from None
     return complete_lens(opened_to(moved, diameter))
-
-
-def _without_row(lens: Lens, old: int) -> tuple[Position, ...]:
-    """Return a lens' positions without one of its rows, whose gaps in front and behind become one."""
-    moved = ((position, gaps_without_row(lens, position, old)) for position in lens.positions)
-    return tuple(position.replace(gaps=tuple(sorted(gaps.items()))) for position, gaps in moved if gaps)

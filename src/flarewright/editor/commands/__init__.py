@@ -8,6 +8,8 @@ Public entry points: `registry.COMMANDS` and `registry.done`, which checks and r
 - `plate`: the plate under the flare
 - `ghosts`: solo, mute, gain and tint of single ghosts
 - `design_targets`: ghost targets of the project's design
-- `lens`: the prescription: cells, rows, stop, another lens; `prescription` returns the table
+- `lens`: the prescription: cells, another lens; `prescription` returns the table
+- `lens_rows`: its rows: added, copied and removed ones, and the place of the stop
+- `row_numbers`: what refers to rows by their numbers, after rows are added, removed or moved
 - `lens_notes`: remarks on cells of the prescription
 """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import atan2, cos, hypot, radians, sin, tan
 from typing import Any
 
@@ -47,7 +48,7 @@ def set_ghost_target(project: Project, ghost: str, values: dict[str, Any]) -> Pr
     ghost_targets = list(design.ghost_targets)
     place = slice(numbers.get(ghost, len(ghost_targets)), numbers.get(ghost, len(ghost_targets)) + 1)
     ghost_targets[place] = [] if ghost_target == GhostTarget(ghost=ghost) else [ghost_target]
-    return _with(project, design, tuple(ghost_targets))
+    return with_targets(project, design, tuple(ghost_targets))
 
 
 def add_ghost(project: Project, place_mm: float, radius_mm: float) -> Project:
@@ -55,7 +56,7 @@ def add_ghost(project: Project, place_mm: float, radius_mm: float) -> Project:
     design = project.design or Design()
     new = GhostTarget(place_mm=round(place_mm, 3), radius_mm=round(max(abs(radius_mm), 0.05), 3))
     # more ghosts need more surfaces than the lens' own structure has
-    return _with(project, design.replace(structure="any", fixed_rows=()), (*design.ghost_targets, new))
+    return with_targets(project, design.replace(structure="any", fixed_rows=()), (*design.ghost_targets, new))
 
 
 def remove_ghost_target(project: Project, number: int, before: dict[str, Any] | None = None) -> Project:
@@ -73,7 +74,7 @@ def remove_ghost_target(project: Project, number: int, before: dict[str, Any] | 
     left = tuple(ghost_target for k, ghost_target in enumerate(design.ghost_targets) if k != number)
     if before is not None and _any_new(design.ghost_targets) and not _any_new(left):
         design = design.replace(**before)
-    return _with(project, design, left)
+    return with_targets(project, design, left)
 
 
 def set_new_ghost_target(project: Project, number: int, values: dict[str, Any]) -> Project:
@@ -81,7 +82,7 @@ def set_new_ghost_target(project: Project, number: int, values: dict[str, Any]) 
     design = _design_with(project, number)
     ghost_targets = list(design.ghost_targets)
     ghost_targets[number] = ghost_targets[number].replace(**values)
-    return _with(project, design, tuple(ghost_targets))
+    return with_targets(project, design, tuple(ghost_targets))
 
 
 def set_design(project: Project, values: dict[str, Any]) -> Project:
@@ -91,7 +92,27 @@ def set_design(project: Project, values: dict[str, Any]) -> Project:
         raise ProjectError("a search from scratch uses added ghosts only, and there is none yet: add a ghost first")
     if values.get("structure") == "any":
         values = {**values, "fixed_rows": ()}
-    return _with(project, design.replace(**values), design.ghost_targets)
+    return with_targets(project, design.replace(**values), design.ghost_targets)
+
+
+def with_lights_at(project: Project, place: Callable[[int], int | None]) -> Project:
+    """Renumber the lights of targets after the lights of a project have changed.
+
+    Parameters
+    ----------
+    project : Project
+    place : callable
+        New number of a light of before; None: it is gone, and so are its targets.
+    """
+    design = project.design
+    if design is None or all(each.light is None for each in design.ghost_targets):
+        return project
+    ghost_targets = []
+    for each in design.ghost_targets:
+        light = None if each.light is None else place(each.light)
+        if light is not None or each.light is None:
+            ghost_targets.append(each.replace(light=light))
+    return with_targets(project, design, tuple(ghost_targets))
 
 
 def clear_ghost_targets(project: Project) -> Project:
@@ -119,7 +140,8 @@ def _any_new(ghost_targets: tuple[GhostTarget, ...]) -> bool:
     return any(ghost_target.ghost is None for ghost_target in ghost_targets)
 
 
-def _with(project: Project, design: Design, ghost_targets: tuple[GhostTarget, ...]) -> Project:
+def with_targets(project: Project, design: Design, ghost_targets: tuple[GhostTarget, ...]) -> Project:
+    """Give a project a design with other targets; from scratch is switched off where none is a new ghost."""
     if not _any_new(ghost_targets):
         # without new ghosts a search from scratch has no targets
         design = design.replace(own_ghosts=True)

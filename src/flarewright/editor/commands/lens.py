@@ -1,8 +1,9 @@
-"""Changes of the prescription: cells, rows, the stop, another lens."""
+"""Changes of the prescription: cells, general data, another lens."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from math import atan, degrees, isfinite, radians, tan
@@ -14,11 +15,10 @@ from ...errors import FlarewrightError, GlassError, LensError
 from ...io.lens.coating_text import UNCOATED, coating_from, format_coating
 from ...io.lens.media import attach
 from ...measure.replay.measured_project import efl_mm, flare_of, is_measured
-from ...model import AsLens, CoatingChoice, Iris, Lens, PerRow, Position, Preset, Project, Row, Stop, Surface
+from ...model import AsLens, CoatingChoice, Iris, Lens, PerRow, Preset, Project, Row, Stop, Surface
 from ...model.project.art import Art
 from ...optics.lens.paraxial import FirstOrder, first_order
-from ...optics.lens.surface_shape import sag
-from ...optics.lens.zoom import gaps_without_row
+from ...optics.lens.zoom import named_position, positioned
 from ...optics.rays.image_height import image_heights
 from ...render.scene.photographic_defaults import as_photographed, plausible_preset
 from ...render.scene.resolve import open_lens
@@ -27,7 +27,6 @@ from ...typing import Floats
 from ..common.messages import sentence, spoken
 
 COLUMNS = ("radius", "thickness", "glass", "n_d", "v_d", "semi_diameter", "coating")
-MOST_ROWS = 200
 DISTORTION_STEP_DEG, DISTORTION_TO_DEG = 2.0, 80.0
 
 
@@ -74,11 +73,36 @@ def set_cell(project: Project, row: int, column: str, text: str) -> Project:
             new = _changed(old, row, column, words)
         except INVALID as error:
             raise LensError(f"row {row}: {sentence(error)}") from None
+    if column == "thickness" and row in _moving(lens, project):
+        return project.replace(lens=_with_gap_of_position(lens, project, row, new.thickness))
     rows = (*lens.rows[:row], new, *lens.rows[row + 1 :])
     if column == "coating" and not isinstance(project.coating, AsLens):
         # the cell shows the row's effective coating, so that is what it changes
         return _recoated(project, lens, row, new)
     return project.replace(lens=lens.replace(rows=rows))
+
+
+def _moving(lens: Lens, project: Project) -> set[int]:
+    """Return the rows with gaps that the zoom or the focus of a project sets, instead of the rows."""
+    for_focus = any(position.focus_distance is not None for position in lens.positions)
+    if project.zoom is None and (project.camera.focus_distance is None or not for_focus):
+        return set()
+    return {row for position in lens.positions for row, _ in position.gaps}
+
+
+def _with_gap_of_position(lens: Lens, project: Project, row: int, gap: float) -> Lens:
+    """Return a lens with another gap in the position that a project uses."""
+    chosen = None if project.zoom is None else named_position(lens, project.zoom)
+    if chosen is None or project.camera.focus_distance is not None:
+        raise LensError(
+            f"row {row}: this gap lies between zoom or focus positions, which set it; choose a position without a "
+            "focus distance on the panel Light first"
+        )
+    changed = chosen.replace(gaps=tuple((k, gap if k == row else old) for k, old in chosen.gaps))
+    try:
+        return lens.replace(positions=tuple(changed if each == chosen else each for each in lens.positions))
+    except INVALID as error:
+        raise LensError(f"row {row}: {sentence(error)}") from None
 
 
 def _recoated(project: Project, lens: Lens, row: int, new: Row) -> Project:
@@ -139,201 +163,6 @@ def _curvature(words: str, row: int) -> float:
     if abs(radius) < 1e-3:
         raise LensError(f'row {row}: radius {words} is smaller than a micrometre; a plane surface is "flat"')
     return 1.0 / radius
-
-
-def add_row(project: Project, row: int) -> Project:
-    """Insert a plane surface in air behind a row, at 1 mm distance where there is room."""
-    lens = own_lens(project)
-    if len(lens.rows) >= MOST_ROWS:
-        raise LensError(f"a lens has at most {MOST_ROWS} rows here")
-    old = lens.rows[row]
-    gap = 0.5 * old.thickness if row + 1 < len(lens.rows) else 1.0
-    medium = old.medium if isinstance(old, Surface) else None
-    semi = old.semi_diameter if isinstance(old, Surface) else None
-    front = old.replace(thickness=old.thickness - gap) if row + 1 < len(lens.rows) else old.replace(thickness=gap)
-    new = Surface(thickness=gap, medium=medium, semi_diameter=semi)
-    added = _renumbered(project, lens, (*lens.rows[:row], front, new, *lens.rows[row + 1 :]), _behind(row + 1))
-    return _with_halved_gap(added, row)
-
-
-def _with_halved_gap(project: Project, row: int) -> Project:
-    """Give both halves of a divided gap half of it at every position that moves it."""
-    lens = project.lens
-    assert isinstance(lens, Lens), "rows are added to a lens of the project"
-    halved = []
-    for position in lens.positions:
-        gaps = dict(position.gaps)
-        if row in gaps:
-            gaps |= {row: 0.5 * gaps[row], row + 1: 0.5 * gaps[row]}
-        halved.append(_with_gaps(position, gaps))
-    return _with_positions(project, tuple(halved))
-
-
-def duplicate_row(project: Project, row: int) -> Project:
-    """Insert a copy of a row behind it."""
-    lens = own_lens(project)
-    if not isinstance(lens.rows[row], Surface):
-        raise LensError(f"row {row} is the stop, and a lens has one")
-    return _renumbered(project, lens, (*lens.rows[: row + 1], *lens.rows[row:]), _behind(row + 1))
-
-
-def remove_row(project: Project, row: int) -> Project:
-    """Remove a row; the gap in front of it absorbs its thickness, and the glass in front extends to the next row."""
-    lens = own_lens(project)
-    gone = lens.rows[row]
-    if isinstance(gone, Stop):
-        raise LensError(f"row {row} is the stop, which every lens has; make another row the stop first")
-    rows = list(lens.rows)
-    if row > 0:
-        rows[row - 1] = rows[row - 1].replace(thickness=rows[row - 1].thickness + gone.thickness)
-    del rows[row]
-    last = rows[-1]
-    if row == len(rows) and isinstance(last, Surface):
-        rows[-1] = last.replace(medium=None)
-    positions = tuple(_with_gaps(position, gaps_without_row(lens, position, row)) for position in lens.positions)
-    still = lens.replace(positions=())
-    shorter = _renumbered(project, still, tuple(rows), lambda k: None if k == row else k - (k > row))
-    return _with_positions(shorter, positions)
-
-
-def move_stop(project: Project, row: int) -> Project:
-    """Move the stop into the air in front of a row, or behind it where glass is in front; surfaces stay.
-
-    Parameters
-    ----------
-    project : Project
-    row : int
-        A surface.
-
-    Returns
-    -------
-    Project
-        Sharpness, brightness and focus are unchanged; the ghosts are bounded elsewhere.
-
-    Raises
-    ------
-    LensError
-        When glass is on both sides, the stop is there already, or a zoom position has no room for it.
-
-    Notes
-    -----
-    `design.finishing.lens_edits.move_stop` replaces a surface by the stop (Van Acoleyen 2025, section 5.3.3), which
-    few lenses tolerate.
-    """
-    lens = own_lens(project)
-    old, rows = lens.stop_row, lens.rows
-    if not 0 <= row < len(rows) or row == old:
-        raise LensError(f"row {row} is no surface; choose one between 0 and {len(rows) - 1} to put the stop next to")
-    gaps = [k for k in (row, row + 1) if k < len(rows) and (k == 0 or getattr(rows[k - 1], "medium", None) is None)]
-    free = [k for k in gaps if k not in (old, old + 1)]
-    if not free:
-        why = "the stop is there already" if gaps else "there is glass on both sides of it"
-        raise LensError(f"the stop cannot go next to row {row}: {why}; choose a row beside another gap of air")
-    # first remove it, so that its two gaps become one, then insert it in front of one of the remaining rows
-    target = free[0] - (free[0] > old)
-    left = list(rows)
-    stop = left.pop(old)
-    if old > 0:
-        left[old - 1] = left[old - 1].replace(thickness=left[old - 1].thickness + stop.thickness)
-    sensor = lens.sensor_distance
-    if old == len(left) and sensor is not None:
-        sensor += rows[old - 1].thickness
-    behind = _room_behind_stop(left, target)
-    if target:
-        left[target - 1] = left[target - 1].replace(thickness=left[target - 1].thickness - behind)
-    left.insert(target, stop.replace(thickness=behind))
-
-    def place(k: int) -> int:
-        reduced = k - (k > old)
-        return target if k == old else reduced + (reduced >= target)
-
-    positions = tuple(_with_stop_at(position, lens, target, behind) for position in lens.positions)
-    still = lens.replace(positions=(), sensor_distance=sensor)
-    moved = _renumbered(project, still, tuple(left), place)
-    return _with_positions(moved, positions)
-
-
-def _with_positions(project: Project, positions: tuple[Position, ...]) -> Project:
-    """Give the project's own lens other positions; raises LensError if its rows do not fit them."""
-    if not positions:
-        return project
-    assert isinstance(project.lens, Lens), "rows are changed of a lens of the project"
-    try:
-        return project.replace(lens=project.lens.replace(positions=positions))
-    except ValueError as error:
-        raise LensError(sentence(error)) from None
-
-
-def _with_gaps(position: Position, gaps: dict[int, float]) -> Position:
-    return position.replace(gaps=tuple(sorted(gaps.items())))
-
-
-def _room_behind_stop(rows: list[Row], target: int) -> float:
-    """Return the distance from the stop to the row behind it: the middle of the space between the rims."""
-    front, back = rows[target - 1] if target else None, rows[target]
-    semis = [each.semi_diameter for each in (front, back) if isinstance(each, Surface) and each.semi_diameter]
-    rim = np.array([min(semis, default=0.0)])
-    with np.errstate(invalid="ignore"):
-        bulge, hollow = (
-            0.0 if each is None else float(np.nan_to_num(sag(each, np.zeros(1), rim)[0])) for each in (front, back)
-        )
-    if front is None:
-        return 1.0 + max(0.0, -hollow)
-    near, far = max(0.0, bulge), front.thickness + min(0.0, hollow)
-    return front.thickness - (0.5 * (near + far) if far > near else 0.5 * front.thickness)
-
-
-def _with_stop_at(position: Position, lens: Lens, target: int, behind: float) -> Position:
-    """Return the gaps of a zoom position for another place of the stop; the stop moves with the row behind it."""
-    gaps = gaps_without_row(lens, position, lens.stop_row)
-    if target - 1 in gaps:
-        gaps[target - 1] -= behind
-        if gaps[target - 1] < 0.0:
-            raise LensError(
-                f"the stop cannot go there: in zoom position {position.name!r} that gap is {-gaps[target - 1]:.2f} mm "
-                "too narrow; choose a row beside another gap of air"
-            )
-    return _with_gaps(position, {k + (k >= target): gap for k, gap in gaps.items()})
-
-
-def _behind(first: int) -> Callable[[int], int]:
-    return lambda k: k + (k >= first)
-
-
-def _renumbered(project: Project, lens: Lens, rows: tuple[Row, ...], place: Callable[[int], int | None]) -> Project:
-    """Give a lens new rows, and renumber everything that refers to rows."""
-    try:
-        presets = {name: _moved(list(c), place, len(rows)) for name, c in lens.coating_presets.items()}
-        positions = tuple(
-            p.replace(gaps=tuple((new, gap) for row, gap in p.gaps if (new := place(row)) is not None))
-            for p in lens.positions
-        )
-        elements = tuple(
-            e.replace(rows=ends) for e in lens.elements if None not in (ends := tuple(place(k) for k in e.rows))
-        )
-        changed = lens.replace(rows=rows, coating_presets=presets, positions=positions, elements=elements)
-    except ValueError as error:
-        raise LensError(sentence(error)) from None
-    coating = project.coating
-    if isinstance(coating, PerRow):
-        coating = PerRow(coatings=_moved(list(coating.coatings), place, len(rows)))
-    base: Project = project.replace(coating=coating, art=_without_names(project.art))
-    return base.replace(lens=changed)
-
-
-def _moved(entries: list[Any], place: Callable[[int], int | None], count: int) -> tuple[Any, ...]:
-    out: list[Any] = [None] * count
-    for k, entry in enumerate(entries):
-        new = place(k)
-        if new is not None:
-            out[new] = entry
-    return tuple(out)
-
-
-def _without_names(art: Art) -> Art:
-    """Remove rules that name rows, as the rows have new numbers."""
-    plain = tuple(rule for rule in art.rules if not any(c.isdigit() for c in rule.select.partition(":")[0]))
-    return art.replace(rules=tuple(rule for rule in plain if not rule.select.removeprefix("not ").startswith("row:")))
 
 
 def choose_lens(project: Project, lens: str | Lens) -> Project:
@@ -447,6 +276,9 @@ def prescription(project: Project) -> Prescription:
         coats = resolve_coatings(lens, project.coating)
     except FlarewrightError:
         coats = tuple(None for _ in lens.rows)
+    with suppress(FlarewrightError):
+        # gaps as the picture has them
+        lens = positioned(lens, project.zoom, project.camera.focus_distance)
     row_notes = notes(lens, facts.get("sensor_distance"))
     rows = tuple(_row(k, row, coats[k], row_notes.get(k, {})) for k, row in enumerate(lens.rows))
     return Prescription(rows, facts, problem, distortion)

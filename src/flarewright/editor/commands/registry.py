@@ -10,7 +10,7 @@ from ...errors import FlarewrightError, ProjectError
 from ...model import Project
 from ...sentences import INVALID
 from ..common.messages import sentence
-from . import design_targets, ghosts, lens, light_path, plate, shot
+from . import design_targets, ghosts, lens, lens_rows, light_path, plate, shot
 
 Command = Callable[..., Project]
 
@@ -38,10 +38,10 @@ COMMANDS: dict[str, tuple[str, Command]] = {
     "put_look": ("Apply a look", shot.put_look),
     "set_row_wavelengths": ("Coat mirrors", shot.set_row_wavelengths),
     "set_cell": ("Edit the prescription", lens.set_cell),
-    "add_row": ("Add a row", lens.add_row),
-    "duplicate_row": ("Duplicate a row", lens.duplicate_row),
-    "remove_row": ("Remove a row", lens.remove_row),
-    "move_stop": ("Move the stop", lens.move_stop),
+    "add_row": ("Add a row", lens_rows.add_row),
+    "duplicate_row": ("Duplicate a row", lens_rows.duplicate_row),
+    "remove_row": ("Remove a row", lens_rows.remove_row),
+    "move_stop": ("Move the stop", lens_rows.move_stop),
     "choose_lens": ("Choose a lens", lens.choose_lens),
     "set_lens_facts": ("Change the lens", lens.set_lens_facts),
     "set_ghost": ("Change a ghost", ghosts.set_ghost),

@@ -13,6 +13,7 @@ from ...measure.replay.measured_project import check_measured, is_measured
 from ...model import BlackBody, Everywhere, Holdout, Iris, Light, PerRow, Project, QuarterWave, Surface
 from ...render.scene.looks import with_look
 from ...render.scene.resolve import open_lens, resolve_project
+from .design_targets import with_lights_at
 
 # largest angle of a dragged light: beyond it a flat picture has no place for the light
 STEEPEST_DEG = 80.0
@@ -70,10 +71,12 @@ def _free_place(project: Project) -> tuple[float, float]:
 
 
 def remove_light(project: Project, light: int) -> Project:
-    """Remove a light; the last one cannot be removed."""
+    """Remove a light and its targets; the last one cannot be removed."""
     if len(project.lights) == 1:
         raise ProjectError("a flare needs a light; move the last one instead")
-    return project.replace(lights=tuple(one for k, one in enumerate(project.lights) if k != light))
+    light_of(project, light)
+    left: Project = project.replace(lights=tuple(one for k, one in enumerate(project.lights) if k != light))
+    return with_lights_at(left, lambda k: None if k == light else k - (k > light))
 
 
 def set_section(section: str, project: Project, values: dict[str, Any]) -> Project:

@@ -13,6 +13,7 @@ from ...io.files.door import shown
 from ...io.images.plate_picture import PlatePicture
 from ...model import Backplate, PlateSearch
 from ...typing import Pixels
+from ...workflow.plates.plate_files import backplate_picture
 from .picture import DrawnPicture
 
 
@@ -73,9 +74,6 @@ def _shown(plate: Backplate, changed_ns: int, size_px: tuple[int, int]) -> Shown
 
 
 def _read(plate: Backplate) -> PlatePicture:
-    # imports SciPy, which the editor does not need without a plate
-    from ...workflow.plates.found_lights import backplate_picture
-
     try:
         return backplate_picture(plate)
     except FileError as error:

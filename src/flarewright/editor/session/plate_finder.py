@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from ...errors import FlarewrightError, ProjectError
 from ...model import Backplate, Project
 from ...typing import Progress
+from ..commands.design_targets import with_lights_at
 from ..common.latest_job import Check, Lane
 from .image_files import in_short
 from .session import Session
@@ -132,7 +133,11 @@ class PlateFinder:
             check()
             if self.session.project.plate != plate:
                 raise ProjectError("the plate was changed during the search, so no lights were placed; find them again")
-            project, remarks = with_found_lights(self.session.project, found)
+            before = self.session.project
+            project, remarks = with_found_lights(before, found)
+            # lights that stay have other numbers among the found ones
+            numbers = {light: k for k, light in enumerate(project.lights)}
+            project = with_lights_at(project, lambda k: numbers.get(before.lights[k]))
             self.session.put(project, "Find lights", placed=True)
         wide = sum(light.extended for light in project.lights)
         if wide > FEW_WIDE_LIGHTS:

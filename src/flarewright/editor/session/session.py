@@ -13,6 +13,7 @@ from ...errors import ProjectError
 from ...io.files.door import expanded
 from ...model import Backplate, Project
 from ...sentences import INVALID
+from ...workflow.plates.plate_files import backplate_picture
 from ..commands.lens import table_of
 from ..commands.registry import done
 from ..common.messages import sentence
@@ -172,8 +173,6 @@ class Session:
         place = expanded(text.strip())
         if place.suffix.lower() in PICTURES:
             self.reach.check(place)
-            from ...workflow.plates.found_lights import backplate_picture
-
             # a large file is read before the session is locked
             backplate_picture(Backplate(image=str(place.resolve())))
             self.do("set_plate", {"values": {"image": str(place.resolve())}})

@@ -63,6 +63,21 @@ def gaps_without_row(lens: Lens, position: Position, row: int) -> dict[int, floa
     return gaps
 
 
+def positions_without_row(lens: Lens, row: int) -> tuple[Position, ...]:
+    """Return the positions of a lens after one of its rows is removed (`gaps_without_row`).
+
+    Positions that move no gap any more are left out.
+    """
+    moved = ((position, gaps_without_row(lens, position, row)) for position in lens.positions)
+    return tuple(position.replace(gaps=tuple(sorted(gaps.items()))) for position, gaps in moved if gaps)
+
+
+def named_position(lens: Lens, zoom: str | float | None) -> Position | None:
+    """Return the position of a lens that a zoom setting names; None for a focal length between positions."""
+    wanted = str(zoom).strip().lower()
+    return next((position for position in lens.positions if position.name.lower() == wanted), None)
+
+
 def positioned(lens: Lens, zoom: str | float | None, distance: float | None) -> Lens:
     """Return a lens at a zoom and a focus setting.
 
@@ -98,8 +113,8 @@ def positioned(lens: Lens, zoom: str | float | None, distance: float | None) -> 
     if not lens.positions:
         raise ProjectError(f"{lens.name} has no positions to zoom to; remove the zoom, or give its file [[positions]]")
     # a name such as "66.7 mm" is the position itself, not a focal length to interpolate
-    named = [position for position in lens.positions if position.name.lower() == str(zoom).strip().lower()]
-    number = None if zoom is None or named else _number(zoom)
+    named = None if zoom is None else named_position(lens, zoom)
+    number = None if zoom is None or named is not None else _number(zoom)
     if zoom is None:
         settings = _settings(lens)
         if len(settings) > 1:
@@ -107,10 +122,10 @@ def positioned(lens: Lens, zoom: str | float | None, distance: float | None) -> 
         return at_position(lens, _focused(lens, settings[0], distance))
     if number is not None:
         return at_position(lens, _between(lens, number, distance))
-    for position in named:
+    if named is not None:
         if distance is None:
-            return at_position(lens, position)
-        mine = next(setting for setting in _settings(lens) if position in setting)
+            return at_position(lens, named)
+        mine = next(setting for setting in _settings(lens) if named in setting)
         return at_position(lens, _focused(lens, mine, distance))
     raise ProjectError(f"{lens.name} has no position {zoom!r}; it has: {_names(lens)}, or give a focal length in mm")
 

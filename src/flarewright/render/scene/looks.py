@@ -66,6 +66,16 @@ def with_look(project: Project, look: Look | str | PathLike[str]) -> tuple[Proje
             if (lost := len(look.example.art.rules) - len(art.rules)) > 0:
                 remarks.append(f"{lost} of the look's rules name ghosts of {look.example.lens} and are left out")
             changes["art"] = art
+        elif section == "scatter" and look.example.scatter is not None and not same_lens:
+            scatter = look.example.scatter
+            # rows of another lens are other surfaces
+            changes["scatter"] = scatter.replace(rows=())
+            if scatter.rows:
+                which = "row" if len(scatter.rows) == 1 else "rows"
+                remarks.append(
+                    f"the look's scatter at {which} {', '.join(str(each.row) for each in scatter.rows)} is for "
+                    "another lens, and left out"
+                )
         elif section == "iris":
             own = project.iris or open_lens(project.lens).lens.iris
             changes["iris"] = own.replace(**look.of("iris"))

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 
 from ...errors import FlarewrightError, ProjectError
-from ...io.images.plate_picture import PlatePicture
-from ...jobs.frame_list import FramePattern
 from ...model import Backplate, Light, LightCurve, LightKey, Project
 from ...model.project.backplate import found_in_plate
 from ...model.project.light import LEAST_LIGHT_DEG, Polygon, Rectangle
@@ -22,12 +20,10 @@ from ...plates.tracking import follow
 from ...render.scene.pixel_place import field_angles_at, image_px
 from ...sentences import INVALID, count, validation_sentences
 from ...typing import Progress
-from .plate_files import plate_picture
+from .plate_files import FRAME, check_single, plate_picture
 from .plate_frame import bare_text, check_plate, images_of, plate_images, plate_optics, same_optics
 from .plate_sources import PlateShot, plate_shot
 
-# frame of a single plate
-_FRAME = 1
 # largest disc and rectangle after a change of the lens, degrees
 _WIDEST_DISC_DEG, _WIDEST_DEG = 60.0, 110.0
 
@@ -49,7 +45,7 @@ class FoundLights:
     @property
     def rows(self) -> list[dict[str, float | int | str]]:
         """The sources in pixels of the plate, the brightest first (`plates.marked.light_rows`)."""
-        return light_rows(self.shot.lights, _FRAME)
+        return light_rows(self.shot.lights, FRAME)
 
 
 def plate_settings_of(plate: Backplate) -> PlateSettings:
@@ -60,25 +56,8 @@ def plate_settings_of(plate: Backplate) -> PlateSettings:
     ProjectError
         They contradict each other, or the file's name stands for a sequence.
     """
-    _check_single(plate)
+    check_single(plate)
     return PlateSettings(plate.image, **search_values(plate))
-
-
-def _check_single(plate: Backplate) -> None:
-    if FramePattern(plate.image).numbered:
-        raise ProjectError(f"{plate.image} stands for a sequence; give the file of one frame")
-
-
-def backplate_picture(plate: Backplate) -> PlatePicture:
-    """Read the plate of a project; the last one is kept, for the search and the comp too.
-
-    Raises
-    ------
-    FlarewrightError
-        It cannot be read, or its name stands for a sequence.
-    """
-    _check_single(plate)
-    return plate_picture(PlateSettings(plate.image, layer=plate.layer, transfer=plate.transfer), _FRAME)
 
 
 def search_values(plate: Backplate) -> dict[str, Any]:
@@ -109,9 +88,9 @@ def search_plate(plate: Backplate, progress: Progress | None = None) -> FoundLig
     report: Progress = progress or (lambda *_: None)
     settings = plate_settings_of(plate)
     report(0.0, "reading the plate")
-    plate_picture(settings, _FRAME)
+    plate_picture(settings, FRAME)
     report(0.4, "finding lights")
-    shot = plate_shot(settings, (_FRAME,))
+    shot = plate_shot(settings, (FRAME,))
     report(1.0, "finding lights")
     return FoundLights(plate.replace(lights_above=shot.threshold), shot)
 
@@ -139,7 +118,7 @@ def with_found_lights(project: Project, found: FoundLights) -> tuple[Project, tu
     framed = _framed(project, found.shot.size_px)
     directions, factor = plate_optics(framed)
     try:
-        lights, lost = lights_at(found.shot.lights, _FRAME, directions, factor, framed.camera.size_px)
+        lights, lost = lights_at(found.shot.lights, FRAME, directions, factor, framed.camera.size_px)
     except INVALID as error:
         raise ProjectError("; ".join(validation_sentences(error))) from None
     if not any(light.intensity > 0.0 for light in lights):
@@ -198,9 +177,9 @@ def backplate_shot(project: Project) -> PlateShot:
             "the editor, or give the plate on the command line"
         )
     settings = plate_settings_of(plate)
-    picture = plate_picture(settings, _FRAME)
+    picture = plate_picture(settings, FRAME)
     none = Sources.from_table(np.zeros((0, 10)))
-    tracks = follow((_FRAME,), [none], picture.size_px[0])
+    tracks = follow((FRAME,), [none], picture.size_px[0])
     return PlateShot(
         settings, plate.lights_above, picture.size_px, picture.pixel_aspect, picture.fps,
         plate_tracks(tracks, picture.size_px), (0,), picture.remarks,

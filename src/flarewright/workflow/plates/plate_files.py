@@ -16,9 +16,13 @@ from ...io.films.film_kind import is_film
 from ...io.images.plate_image import read_matte
 from ...io.images.plate_picture import PlatePicture, read_plate
 from ...jobs.frame_list import FramePattern, frames_text
+from ...model import Backplate
 from ...model.project.backplate import Transfer
 from ...plates.settings import PlateSettings
 from ...typing import Pixels
+
+FRAME = 1
+"""Frame of a single plate."""
 
 
 def is_picture(settings: PlateSettings) -> bool:
@@ -171,3 +175,21 @@ def plate_matte(settings: PlateSettings, frame: int, size_px: tuple[int, int]) -
             "matte of the plate's size"
         )
     return matte
+
+
+def check_single(plate: Backplate) -> None:
+    """Raise a ProjectError if the name of a single plate stands for a sequence."""
+    if FramePattern(plate.image).numbered:
+        raise ProjectError(f"{plate.image} stands for a sequence; give the file of one frame")
+
+
+def backplate_picture(plate: Backplate) -> PlatePicture:
+    """Read the plate of a project; the last one is kept, for the search and the comp too.
+
+    Raises
+    ------
+    FlarewrightError
+        It cannot be read, or its name stands for a sequence.
+    """
+    check_single(plate)
+    return plate_picture(PlateSettings(plate.image, layer=plate.layer, transfer=plate.transfer), FRAME)
