@@ -12,7 +12,7 @@ from importlib.resources import files
 import pytest
 
 from flarewright.editor.commands.design_targets import direction, ghost_target_names, new_discs, target_project
-from flarewright.editor.commands.ghosts import GhostOverride, override_of, soloed
+from flarewright.editor.commands.ghost_rules import GhostOverride, override_of, soloed
 from flarewright.editor.commands.lens import own_lens, prescription, table_of
 from flarewright.editor.commands.registry import COMMANDS, done
 from flarewright.editor.common.latest_job import Lane

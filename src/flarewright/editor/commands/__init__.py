@@ -7,6 +7,7 @@ Public entry points: `registry.COMMANDS` and `registry.done`, which checks and r
 - `light_path`: keyframes of a light's path
 - `plate`: the plate under the flare
 - `ghosts`: solo, mute, gain and tint of single ghosts
+- `ghost_rules`: what all rules together make of each ghost
 - `design_targets`: ghost targets of the project's design
 - `lens`: the prescription: cells, another lens; `prescription` returns the table
 - `lens_rows`: its rows: added, copied and removed ones, and the place of the stop

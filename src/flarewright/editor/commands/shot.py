@@ -143,7 +143,7 @@ def set_pass_gain(project: Project, name: str, gain: float) -> Project:
     gains = {key: value for key, value in project.art.gain.items() if key != name}
     if gain != 1.0:
         gains[name] = gain
-    return project.replace(art=project.art.replace(gain=gains))
+    return project.replace(art=project.art.replace(gain=gains, physical=False))
 
 
 def set_coating(project: Project, text: str) -> Project:

@@ -76,7 +76,8 @@ def see(project: Project, grade: Grade, progress: Progress | None = None) -> Pic
         Exceptions that it raises end the work.
     """
     stage = staged(project, grade, SMALL)
-    art = Art(rules=tuple(rule for rule in project.art.rules if rule.enable is None))
+    ruled = () if project.art.physical else project.art.rules
+    art = Art(rules=tuple(rule for rule in ruled if rule.enable is None))
     quality = stage.quality
     if grade == "final":
         quality = Quality(

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...model import Project
 from ..commands.design_targets import new_discs, target_project
-from ..commands.ghosts import is_shown
+from ..commands.ghost_rules import hidden
 from . import render_picture
 from .display_image import jpeg, png
 from .draft_calibration import levels_at
@@ -72,7 +72,9 @@ def picked(screen: Screen, u: float, v: float) -> tuple[str, ...]:
     project = screen.session.project
     if seen is None or not same_ghosts(seen.project, project):
         return ()
-    found = sorted(under(seen, u, v), key=lambda name: not is_shown(project.art, name))
+    here = under(seen, u, v)
+    unseen = hidden(project, here) if project.art.rules else frozenset()
+    found = sorted(here, key=lambda name: name in unseen)
     near = [name for name in found[:LOOKED_AT] if is_there(single_ghost(seen.project, name, _grade(screen)), u, v)]
     return (*near, *found[LOOKED_AT:])
 

@@ -13,7 +13,7 @@ from ...render.image.aces_view import aces_available
 from ...render.scene.resolve import open_lens
 from ...workflow.keyframes import length_s
 from ..commands.design_targets import ghost_target_names
-from ..commands.ghosts import override_of, soloed
+from ..commands.ghost_rules import override_of, overrides, soloed
 from ..commands.lens import prescription, table_of
 from ..commands.shot import coating_text, iris_of
 from ..common.light_names import light_label
@@ -61,8 +61,8 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
         "path_s": length_s(project),
         "coating": coating_text(project),
         "quality": project.quality.model_dump(mode="json"),
-        "pass_gain": dict(project.art.gain),
-        "solo": list(soloed(project.art)),
+        "pass_gain": {} if project.art.physical else dict(project.art.gain),
+        "solo": [] if project.art.physical else list(soloed(project.art)),
         "by_hand": len(project.art.rules) + len(project.art.gain),
         "design": _design(project, history),
         "view": session.view.model_dump(mode="json") | {"stops": round(screen.exposure_stops, 2)},
@@ -196,12 +196,15 @@ def ghost_rows(screen: Screen) -> dict[str, Any]:
         return {"fresh": False, "ghosts": []}
     brightest = seen.ghosts[0].flux if seen.ghosts else 1.0
     rows = []
+    ruled = overrides(project, [ghost.name for ghost in seen.ghosts])
     for ghost in seen.ghosts:
-        mine = override_of(project.art, ghost.name)
+        mine, whole = override_of(project.art, ghost.name), ruled[ghost.name]
         rows.append(
             {
                 "name": ghost.name, "share": ghost.flux / brightest, "flux": ghost.flux, "size": ghost.size_mm,
-                "centre": list(ghost.centre), "muted": mine.muted, "gain": mine.gain, "tint": list(mine.tint),
+                "centre": list(ghost.centre), "muted": whole.muted, "gain": mine.gain, "tint": list(mine.tint),
+                # by all rules, also those of the file that name rows or rank ghosts
+                "whole": {"gain": whole.gain, "tint": list(whole.tint)},
             }
         )  # fmt: skip
     return {"fresh": pictured(seen.project) == pictured(project), "ghosts": rows}

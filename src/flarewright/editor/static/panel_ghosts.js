@@ -18,7 +18,9 @@ export function ghostPanel(app) {
   const setGhost = (values, held = '') => {
     const ghost = chosen();
     if (!ghost) return null;
-    Object.assign(ghost, values);
+    // what the server answers where no other rule changes this ghost
+    const { gain, tint } = { ...ghost, ...values };
+    Object.assign(ghost, values, { whole: { gain, tint } });
     return app.lively('set_ghost', { name: app.ghost, values }, held);
   };
   const tint = h('input', { type: 'color' });
@@ -43,7 +45,7 @@ export function ghostPanel(app) {
     bar.style.width = `${Math.max(1, 110 * Math.sqrt(ghost.share))}px`;
     const element = h('tr', { class: `${ghost.name === app.ghost ? 'chosen' : ''} ${muted ? 'muted' : ''}`, 'data-ghost': ghost.name, 'aria-selected': String(ghost.name === app.ghost), tabindex: -1 },
       h('td', {}, ghost.name), h('td', { style: 'text-align:left' }, bar, ` ${(100 * ghost.share).toPrecision(2) < 0.01 ? '<0.01' : Number((100 * ghost.share).toPrecision(2))} %`), h('td', {}, ghost.size.toFixed(2)),
-      h('td', {}, ghost.muted ? 'muted' : ghost.gain !== 1 ? `× ${Number(ghost.gain.toPrecision(3))}` : '', white(ghost.tint) ? null : h('i', { class: 'tint', style: `background:${hex(ghost.tint)}`, title: 'tinted' })));
+      h('td', {}, ghost.muted ? 'muted' : ghost.whole.gain !== 1 ? `× ${Number(ghost.whole.gain.toPrecision(3))}` : '', white(ghost.whole.tint) ? null : h('i', { class: 'tint', style: `background:${hex(ghost.whole.tint)}`, title: 'tinted' })));
     element.addEventListener('click', () => app.choose(ghost.name === app.ghost ? null : ghost.name));
     element.addEventListener('keydown', (event) => {
       if (event.key === 'Enter') app.choose(ghost.name);
