@@ -12,6 +12,7 @@ from flarewright.editor.preview.progressive_render import sharpen
 from flarewright.editor.preview.queries import outline_png, picked
 from flarewright.editor.preview.viewport import Screen
 from flarewright.editor.server.page_state import ghost_rows, state_of
+from flarewright.editor.server.uploads import take_in
 from flarewright.editor.session.files import export_picture, imported, lens_text, open_any
 from flarewright.editor.session.session import begin
 from flarewright.errors import FlarewrightError
@@ -79,6 +80,19 @@ def test_it_opens_with_the_sensor_of_its_captures(tmp_path):
     saved = tmp_path / "old.toml"
     saved.write_text('lens = "model.json"\n[camera]\nsize_px = [320, 180]\n[[lights]]\nfield_deg = [40.0, 0.0]\n')
     assert open_any(str(saved))[0].camera.sensor_mm == pytest.approx((22.5, 22.5 * 180 / 320))
+    # and one that is dropped on the page
+    whole = saved.read_bytes().replace(b"model.json", str(tmp_path / "model.json").encode())
+    dropped = imported("old.toml", whole, tmp_path / "drops").project
+    assert dropped.camera.sensor_mm == pytest.approx((22.5, 22.5 * 180 / 320))
+
+
+def test_a_dropped_look_is_refused_as_one_of_the_library_is(path):
+    session, _ = begin(path)
+    before = session.project
+    look = b'name = "Warm"\nlens = "heliar-tronnier"\nf_number = 8.0\n[[lights]]\nfield_deg = [1.0, 1.0]\n'
+    with pytest.raises(FlarewrightError, match="a measured flare has the look of its lens"):
+        take_in(session, "warm.look.toml", look)
+    assert session.project == before
 
 
 def test_the_screen_shows_the_replay_and_lists_its_ghosts(screen):

@@ -20,7 +20,9 @@ from flarewright.model import (
     Project,
     ProjectCurve,
     QuarterWave,
+    RowScatter,
     Rule,
+    Scatter,
 )
 from flarewright.optics.rays.pack import resolve_coatings, rows_in_air
 from flarewright.render.scene.looks import demonstration, look_of, with_look
@@ -94,6 +96,16 @@ def test_coatings_by_row_go_to_another_lens_in_turn():
     own, remarks = with_look(Project(lens=TESSAR, lights=shot().lights), look)
     assert (own.coating, remarks) == (look.example.coating, ())
     assert own.art == look.example.art
+
+
+def test_scatter_by_row_stays_with_its_lens():
+    scatter = Scatter(model="abg", rows=(RowScatter(row=1, share=0.1), RowScatter(row=4, share=0.2)))
+    look, _ = look_of(rich().replace(scatter=scatter, art=Art()), "Dusk")
+    after, remarks = with_look(shot(), look)
+    assert after.scatter == Scatter(model="abg")
+    assert remarks == ("the look's scatter at rows 1, 4 is for another lens, and left out",)
+    own, remarks = with_look(Project(lens=TESSAR, lights=shot().lights), look)
+    assert (own.scatter, remarks) == (scatter, ())
 
 
 def test_presets_that_the_other_lens_has_are_its_own():

@@ -190,11 +190,15 @@ def new_discs(project: Project) -> tuple[tuple[float, float, float], ...]:
     if design is None:
         return ()
     x, y = direction(project)
-    return tuple(
-        (ghost_target.place_mm * x, ghost_target.place_mm * y, abs(ghost_target.radius_mm))
-        for ghost_target in design.ghost_targets
-        if ghost_target.ghost is None and ghost_target.place_mm is not None and ghost_target.radius_mm is not None
-    )
+    discs = []
+    for each in design.ghost_targets:
+        if each.ghost is not None or each.radius_mm is None or each.action == "ignore":
+            continue
+        # ghosts lie on the line to the light, so a point beside it is projected
+        along = each.place_mm if each.at_mm is None else each.at_mm[0] * x + each.at_mm[1] * y
+        place = (along or 0.0) + each.move_mm
+        discs.append((place * x, place * y, abs(each.radius_mm) * each.height))
+    return tuple(discs)
 
 
 def direction(project: Project) -> tuple[float, float]:

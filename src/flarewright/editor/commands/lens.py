@@ -15,7 +15,7 @@ from ...errors import FlarewrightError, GlassError, LensError
 from ...io.lens.coating_text import UNCOATED, coating_from, format_coating
 from ...io.lens.media import attach
 from ...measure.replay.measured_project import efl_mm, flare_of, is_measured
-from ...model import AsLens, CoatingChoice, Iris, Lens, PerRow, Preset, Project, Row, Stop, Surface
+from ...model import AsLens, CoatingChoice, Iris, Lens, PerRow, Preset, Project, ProjectCurve, Row, Stop, Surface
 from ...model.project.art import Art
 from ...optics.lens.paraxial import FirstOrder, first_order
 from ...optics.lens.zoom import named_position, positioned
@@ -166,9 +166,10 @@ def _curvature(words: str, row: int) -> float:
 
 
 def choose_lens(project: Project, lens: str | Lens) -> Project:
-    """Change to another lens; settings of the old lens (coatings, overrides, zoom, targets) are dropped.
+    """Change to another lens; settings of the old lens (coatings, overrides, zoom, targets, rows) are dropped.
 
-    Lights keep their places in the picture. The f-number stays the same if the lens opens that far.
+    Lights keep their places in the picture. The f-number stays the same if the lens opens that far. The sensor is where
+    the lens has it.
     """
     known = open_lens(lens).lens
     efl = first_order(known).efl
@@ -185,12 +186,24 @@ def choose_lens(project: Project, lens: str | Lens) -> Project:
     )
     stopped = None if project.f_number is None else max(project.f_number, known.f_number)
     iris = known.iris if known.iris != Iris() else project.iris
+    scatter = project.scatter
     changed: Project = project.replace(
         lens=lens, f_number=stopped, iris=iris, coating=first_coating(known), lights=lights, art=Art(), zoom=None,
-        design=None,
+        design=None, camera=project.camera.replace(sensor_distance=None),
+        # its rows are other surfaces
+        scatter=None if scatter is None else scatter.replace(rows=()),
+        curves=tuple(_for_lens(curve, known) for curve in project.curves if curve.of != "zoom"),
     )  # fmt: skip
     # blades of a library lens are rounded and a little rough
     return as_photographed(changed, {"f_number", "coating", "lights"})[0]
+
+
+def _for_lens(curve: ProjectCurve, lens: Lens) -> ProjectCurve:
+    """Return a curve whose f-numbers a lens can open to; others unchanged."""
+    if curve.of != "f_number":
+        return curve
+    values = (value for value in curve.values if isinstance(value, float))
+    return curve.replace(values=tuple(max(value, lens.f_number) for value in values))
 
 
 def _efl(project: Project) -> float:
@@ -210,8 +223,15 @@ def _kept_angles(field_deg: tuple[float, float], zoom: float) -> tuple[float, ..
 
 
 def set_lens_facts(project: Project, values: dict[str, Any]) -> Project:
-    """Change the lens' general data: name, f_number (wide open), field_deg, sensor_distance."""
-    return project.replace(lens=own_lens(project).replace(**values))
+    """Change the lens' general data: name, f_number (wide open), field_deg, sensor_distance.
+
+    A wider f-number of the project becomes that of the lens.
+    """
+    lens = own_lens(project).replace(**values)
+    stopped = project.f_number
+    if "f_number" in values and stopped is not None:
+        stopped = max(stopped, lens.f_number)
+    return project.replace(lens=lens, f_number=stopped)
 
 
 def table_of(project: Project) -> str:

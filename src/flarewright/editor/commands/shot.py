@@ -10,7 +10,8 @@ from ...io.lens.coating_text import parse_coating_choice
 from ...io.project.look_file import read_look, shipped_looks
 from ...io.project.spectrum_text import parse_spectrum
 from ...measure.replay.measured_project import check_measured, is_measured
-from ...model import BlackBody, Everywhere, Holdout, Iris, Light, PerRow, Project, QuarterWave, Surface
+from ...model import BlackBody, Everywhere, Holdout, Iris, Light, Look, PerRow, Project, QuarterWave, Surface
+from ...optics.lens.zoom import positioned
 from ...render.scene.looks import with_look
 from ...render.scene.resolve import open_lens, resolve_project
 from .design_targets import with_lights_at
@@ -93,9 +94,11 @@ def set_fields(project: Project, values: dict[str, Any]) -> Project:
         changed = project.replace(**values)
         check_measured(changed, limit=True)
         return changed
-    if (f_number := values.get("f_number")) is not None:
-        values = {**values, "f_number": max(f_number, open_lens(project.lens).lens.f_number)}
     changed = project.replace(**values)
+    if changed.f_number is not None:
+        # a zoom may open less at its long end
+        lens = positioned(open_lens(project.lens).lens, changed.zoom, project.camera.focus_distance)
+        changed = changed.replace(f_number=max(changed.f_number, lens.f_number))
     resolve_project(changed)
     return changed
 
@@ -155,13 +158,18 @@ def set_coating(project: Project, text: str) -> Project:
 
 def put_look(project: Project, name: str) -> Project:
     """Apply a shipped look to the lens and the lights."""
-    if is_measured(project):
-        raise ProjectError("a measured flare has the look of its lens; choose a lens first")
     if name not in shipped_looks():
         raise ProjectError(f"the library has no look {name!r}")
-    changed, _ = with_look(project, read_look(name))
+    return wearing(project, read_look(name))[0]
+
+
+def wearing(project: Project, look: Look) -> tuple[Project, tuple[str, ...]]:
+    """Apply a look, with remarks on what does not fit; a measured flare, or a lens that cannot wear it, is refused."""
+    if is_measured(project):
+        raise ProjectError("a measured flare has the look of its lens; choose a lens first")
+    changed, remarks = with_look(project, look)
     resolve_project(changed)
-    return changed
+    return changed, remarks
 
 
 def set_row_wavelengths(project: Project, values: dict[str, float]) -> Project:

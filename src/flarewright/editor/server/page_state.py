@@ -11,7 +11,7 @@ from ...model import Design, Project
 from ...optics.rays.pack import preset_names
 from ...render.image.aces_view import aces_available
 from ...render.scene.resolve import open_lens
-from ...workflow.keyframes import length_s
+from ...workflow.keyframes import is_still, length_s
 from ..commands.design_targets import ghost_target_names
 from ..commands.ghost_rules import override_of, overrides, soloed
 from ..commands.lens import prescription, table_of
@@ -59,6 +59,7 @@ def state_of(screen: Screen, solver: Solver) -> dict[str, Any]:
         "holdout": None if project.holdout is None else project.holdout.model_dump(mode="json"),
         "plate": None if project.plate is None else project.plate.model_dump(mode="json") | {"lit": project.plate.lit},
         "path_s": length_s(project),
+        "moves": not is_still(project),
         "coating": coating_text(project),
         "quality": project.quality.model_dump(mode="json"),
         "pass_gain": {} if project.art.physical else dict(project.art.gain),

@@ -10,9 +10,8 @@ from ...io.files.state_folder import state_folder
 from ...io.images.mask_image import read_mask
 from ...io.images.plate_image import read_depth, read_matte
 from ...model import Backplate
-from ...render.scene.looks import with_look
 from ..commands.lens import choose_lens
-from ..commands.shot import iris_of
+from ..commands.shot import iris_of, wearing
 from ..preview.plate_view import plate_for
 from ..session.files import imported
 from ..session.session import Session
@@ -58,7 +57,7 @@ def take_in(session: Session, name: str, data: bytes, use: str = "", light: int 
     elif found.project is not None:
         session.put(found.project, f"Import {name}", begins=True)
     elif found.look is not None:
-        changed, remarks = with_look(session.project, found.look)
+        changed, remarks = wearing(session.project, found.look)
         session.put(changed, f"Look {found.look.name}", look=True)
         return remarks
     elif found.lens is not None:

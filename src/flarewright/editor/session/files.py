@@ -216,7 +216,7 @@ def imported(name: str, data: bytes, folder: Path, allowed: Callable[[Project], 
                 for image in pictures(found):
                     if Path(image.path).parent == folder and not Path(image.path).is_file():
                         raise ProjectError(f"{image.path} does not exist")
-                return Imported(project=found)
+                return Imported(project=with_sensor(found) if is_measured(found) else found)
         if is_ghost_model_file(str(path)):
             return Imported(project=project_for_measured(str(path)))
         opened = open_lens(path)

@@ -58,6 +58,13 @@ def _opening(values: dict[str, Any], project: Project) -> str:
     return f"f/{asked:g} became f/{project.f_number:g}: this lens opens no wider"
 
 
+def _facts(values: dict[str, Any], project: Project) -> str:
+    asked = values["values"].get("f_number")
+    if asked is None or project.f_number != asked:
+        return ""
+    return f"the picture is drawn at f/{project.f_number:g}: this lens opens no wider"
+
+
 def _time(values: dict[str, Any], _: Project) -> str:
     asked = float(values["at_s"])
     if asked < 0.0:
@@ -72,6 +79,6 @@ def _look(values: dict[str, Any], project: Project) -> str:
 
 
 REPORTED: dict[str, Callable[[dict[str, Any], Project], str]] = {
-    "move_light": _light, "set_iris": _iris, "set_fields": _opening, "set_key": _time, "move_key": _time,
-    "put_look": _look,
+    "move_light": _light, "set_iris": _iris, "set_fields": _opening, "set_lens_facts": _facts, "set_key": _time,
+    "move_key": _time, "put_look": _look,
 }  # fmt: skip

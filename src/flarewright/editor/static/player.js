@@ -4,7 +4,8 @@ export function player(app) {
   let from = 0;
   let started = 0;
   const end = () => app.state?.path_s ?? 0;
-  self.keyed = () => Boolean(app.state?.lights.some((light) => light.keys.length));
+  // also by curves of intensity, colour, f-number and others, which a file has
+  self.keyed = () => Boolean(app.state?.moves);
   self.setLoop = (loop) => { self.loop = loop; localStorage.setItem('loop', loop ? 'yes' : 'no'); self.heard(); };
 
   function frame(now) {
@@ -57,7 +58,7 @@ export function player(app) {
   // consecutive moves form one step of the history
   self.rest = () => {
     if (self.keyed()) return app.view.settle('go_to', { at_s: Number(self.at.toFixed(3)) }, 'go_to');
-    // no light moves, so nothing is stored, and pictures of the project are shown again
+    // nothing moves, so nothing is stored, and pictures of the project are shown again
     app.view.letGo();
     return Promise.resolve();
   };

@@ -488,11 +488,12 @@ export function viewport(canvas, app) {
       return { key: one.name, name: one.name, own: { place: unmoved, radius: one.radius }, place, radius: one.radius * (ghostTarget?.height ?? 1), changed: Boolean(ghostTarget), removed: ghostTarget?.action === 'remove' };
     });
     ghostTargets.forEach((ghostTarget, number) => {
-      if (!ghostTarget.ghost) out.push({ key: `w${number}`, number, place: ghostTarget.place_mm + ghostTarget.move_mm, radius: ghostTarget.radius_mm * ghostTarget.height, changed: true });
+      if (!ghostTarget.ghost) out.push({ key: `w${number}`, number, place: (ghostTarget.at_mm ? direction().reduce((sum, part, axis) => sum + part * ghostTarget.at_mm[axis], 0) : ghostTarget.place_mm) + ghostTarget.move_mm, radius: ghostTarget.radius_mm * ghostTarget.height, changed: true });
     });
     if (self.preview) for (const one of out) if (one.key === self.preview.key) Object.assign(one, self.preview);
     return out;
   }
+  self.targetPlace = (number) => targetCircles().find((one) => one.key === `w${number}`)?.place;
   function grab(px, py) {
     if (!self.annotate) return null;
     const f = frame();
@@ -524,7 +525,7 @@ export function viewport(canvas, app) {
     if (!now) return;
     const round = (value) => Number(value.toFixed(3));
     const ghostTarget = one.number !== undefined
-      ? ['set_new_ghost_target', { number: one.number, values: { place_mm: round(now.place), move_mm: 0, radius_mm: round(now.radius), height: 1 } }]
+      ? ['set_new_ghost_target', { number: one.number, values: { place_mm: round(now.place), at_mm: null, move_mm: 0, radius_mm: round(now.radius), height: 1 } }]
       : ['set_ghost_target', { ghost: one.name, values: { move_mm: round(now.place - one.own.place), height: Number(Math.max(0.01, Math.abs(now.radius / one.own.radius)).toFixed(4)) } }];
     // a rejected command shows an error, and the ghost returns to its place
     await app.command(...ghostTarget, group).catch(() => {});
