@@ -70,3 +70,8 @@ def test_curves_alone_move_the_project_in_time(project):
     light = project.lights[0].replace(curves=(LightCurve(of="intensity", at_s=(0.0, 2.0), values=(1.0, 3.0)),))
     moving = project.replace(lights=(light,))
     assert do(moving, "go_to", at_s=1.0).lights[0].intensity == 2.0
+
+
+def test_an_abbe_number_of_zero_is_refused_in_words(project):
+    with pytest.raises(FlarewrightError, match=r"row 0: Abbe number V_d must be more than 5, not 0"):
+        do(project, "set_cell", row=0, column="v_d", text="0")

@@ -69,6 +69,13 @@ def test_a_light_that_is_not_there_is_not_removed_in_silence(project):
         do(project, "remove_light", light=7)
 
 
+@pytest.mark.parametrize("command", ["add_row", "duplicate_row", "remove_row"])
+@pytest.mark.parametrize("row", [-1, 5])
+def test_a_row_that_is_not_there_is_refused(command, row):
+    with pytest.raises(FlarewrightError, match=rf"there is no row {row}; they count from 0 to 4"):
+        do(zoom_project(), command, row=row)
+
+
 def test_targets_scatter_and_fixed_rows_follow_their_rows(project):
     stop = open_lens(project.lens).lens.stop_row
     last = stop + 2

@@ -15,7 +15,20 @@ from ...errors import FlarewrightError, GlassError, LensError
 from ...io.lens.coating_text import UNCOATED, coating_from, format_coating
 from ...io.lens.media import attach
 from ...measure.replay.measured_project import efl_mm, flare_of, is_measured
-from ...model import AsLens, CoatingChoice, Iris, Lens, PerRow, Preset, Project, ProjectCurve, Row, Stop, Surface
+from ...model import (
+    AsLens,
+    CoatingChoice,
+    Iris,
+    Lens,
+    Medium,
+    PerRow,
+    Preset,
+    Project,
+    ProjectCurve,
+    Row,
+    Stop,
+    Surface,
+)
 from ...model.project.art import Art
 from ...optics.lens.paraxial import FirstOrder, first_order
 from ...optics.lens.zoom import named_position, positioned
@@ -140,6 +153,8 @@ def _medium(old: Surface, row: int, column: str, words: str) -> Any:
             return attach(None, value, old.medium.v_d if old.medium is not None else None)[0]
         if old.medium is None:
             raise GlassError(f"row {row}: air has no V_d; write a glass or its n_d first")
+        # a value that no glass can have is refused before a dispersion is fitted to it
+        Medium(n_d=old.medium.n_d, v_d=value)
         return attach(None, old.medium.n_d, value)[0]
     except GlassError as error:
         raise LensError(f"row {row}: {str(error).removeprefix(f'row {row}: ')}") from None

@@ -18,12 +18,19 @@ from .row_numbers import renumbered
 MOST_ROWS = 200
 
 
+def _row(lens: Lens, row: int) -> Row:
+    """Return a row by its number; raises LensError if there is none."""
+    if not 0 <= row < len(lens.rows):
+        raise LensError(f"there is no row {row}; they count from 0 to {len(lens.rows) - 1}")
+    return lens.rows[row]
+
+
 def add_row(project: Project, row: int) -> Project:
     """Insert a plane surface in air behind a row, at 1 mm distance where there is room."""
     lens = own_lens(project)
     if len(lens.rows) >= MOST_ROWS:
         raise LensError(f"a lens has at most {MOST_ROWS} rows here")
-    old = lens.rows[row]
+    old = _row(lens, row)
     gap = 0.5 * old.thickness if row + 1 < len(lens.rows) else 1.0
     medium = old.medium if isinstance(old, Surface) else None
     semi = old.semi_diameter if isinstance(old, Surface) else None
@@ -51,7 +58,7 @@ def _with_halved_gap(project: Project, row: int) -> Project:
 def duplicate_row(project: Project, row: int) -> Project:
     """Insert a copy of a row behind it; a copy of the last row stands 1 mm behind it."""
     lens = own_lens(project)
-    old = lens.rows[row]
+    old = _row(lens, row)
     if not isinstance(old, Surface):
         raise LensError(f"row {row} is the stop, and a lens has one")
     front = old
@@ -79,7 +86,7 @@ def _with_sensor_farther(lens: Lens, project: Project, by: float) -> tuple[Lens,
 def remove_row(project: Project, row: int) -> Project:
     """Remove a row; the gap in front of it absorbs its thickness, and the glass in front extends to the next row."""
     lens = own_lens(project)
-    gone = lens.rows[row]
+    gone = _row(lens, row)
     if isinstance(gone, Stop):
         raise LensError(f"row {row} is the stop, which every lens has; make another row the stop first")
     rows = list(lens.rows)

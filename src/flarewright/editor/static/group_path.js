@@ -3,6 +3,8 @@ import { button, h, number as parsed, toast } from './ui.js';
 
 // keys lie at hundredths of a second
 const HALF_STEP_S = 0.0051;
+// the latest time of a key
+const LAST_S = 86400;
 
 export function pathGroup(app) {
   const { player } = app;
@@ -25,7 +27,10 @@ export function pathGroup(app) {
     const value = parsed(box.value);
     if (value === null) toast(`Time: “${box.value}” is no number, so it stays ${player.at.toFixed(2)} s.`, 'error', 9000, 'path time');
     else if (value < 0) toast(`${value} s became 0 s: a path starts there.`, 'info', 9000, 'path time');
-    if (value === null) box.value = player.at.toFixed(2); else player.go(value);
+    else if (value > LAST_S) toast(`${value} s became ${LAST_S} s: a path ends within a day.`, 'info', 9000, 'path time');
+    if (value !== null) player.go(Math.min(value, LAST_S));
+    // also while the box has the focus, when no answer rewrites it
+    box.value = player.at.toFixed(2);
   });
   box.addEventListener('keydown', (event) => { if (event.key === 'Enter') box.blur(); });
   let drawn = '';
