@@ -32,6 +32,15 @@ def test_another_lens_drops_rows_sensor_and_zoom_of_the_old_one(project):
     resolve_project(do(other, "go_to", at_s=0.0))
 
 
+def test_an_anamorphic_lens_is_drawn_wide_as_when_it_is_opened(project):
+    wide = do(project, "choose_lens", lens="anamorphic-heliar-2x")
+    assert wide.camera.desqueeze
+    assert not do(wide, "choose_lens", lens="tessar-brendel").camera.desqueeze
+    # a project that keeps the squeezed picture keeps it with another anamorphic lens
+    own = wide.replace(camera=wide.camera.replace(desqueeze=False))
+    assert not do(own, "choose_lens", lens="anamorphic-heliar-2x").camera.desqueeze
+
+
 def test_a_zoom_position_that_opens_less_stops_the_lens_down(project):
     lens = open_lens("canon-70-200").lens
     positions = tuple(

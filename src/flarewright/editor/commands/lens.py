@@ -17,6 +17,7 @@ from ...io.lens.media import attach
 from ...measure.replay.measured_project import efl_mm, flare_of, is_measured
 from ...model import (
     AsLens,
+    Camera,
     CoatingChoice,
     Iris,
     Lens,
@@ -204,13 +205,26 @@ def choose_lens(project: Project, lens: str | Lens) -> Project:
     scatter = project.scatter
     changed: Project = project.replace(
         lens=lens, f_number=stopped, iris=iris, coating=first_coating(known), lights=lights, art=Art(), zoom=None,
-        design=None, camera=project.camera.replace(sensor_distance=None),
+        design=None, camera=_camera_for(project, known),
         # its rows are other surfaces
         scatter=None if scatter is None else scatter.replace(rows=()),
         curves=tuple(_for_lens(curve, known) for curve in project.curves if curve.of != "zoom"),
     )  # fmt: skip
     # blades of a library lens are rounded and a little rough
     return as_photographed(changed, {"f_number", "coating", "lights"})[0]
+
+
+def _camera_for(project: Project, lens: Lens) -> Camera:
+    """Return the camera for another lens: the sensor is where the lens has it, an anamorphic picture is drawn wide."""
+    camera = project.camera.replace(sensor_distance=None)
+    if camera.squeeze is not None or camera.sensor_mm is not None:
+        return camera
+    try:
+        squeezed = not is_measured(project) and open_lens(project.lens).lens.squeeze is not None
+    except FlarewrightError:
+        return camera
+    # between two lenses of one kind the choice of the project stays
+    return camera if squeezed == (lens.squeeze is not None) else camera.replace(desqueeze=lens.squeeze is not None)
 
 
 def _for_lens(curve: ProjectCurve, lens: Lens) -> ProjectCurve:
