@@ -111,3 +111,23 @@ def test_lights_of_a_dropped_photograph_are_found_dragged_and_undone(tab, tmp_pa
     tab.rest()
     assert tab.page.locator("#find-lights").is_hidden()
     assert not tab.page.locator("#plate-words").is_visible()
+
+
+def test_undo_of_a_removed_plate_brings_the_exposure_back(tab):
+    drop(tab, "night.png", night())
+    tab.until("flarewright.plateLights()?.lights.length === 3")
+    tab.page.click("#find-lights")
+    tab.until("flarewright.state.plate.lit && !flarewright.state.finding.running")
+    assert tab.state()["view"]["exposure_stops"] is None
+    tab.page.click("#plate-none")
+    tab.until("!flarewright.state.plate && flarewright.state.view.exposure_stops === 0 && !flarewright.under.way")
+    tab.page.locator("#view").focus()
+    tab.page.keyboard.press("Control+z")
+    tab.until("flarewright.state.plate?.lit && flarewright.state.view.exposure_stops === null")
+    # it was that of a black picture without the plate
+    tab.page.keyboard.press("Control+z")
+    tab.page.keyboard.press("Control+z")
+    tab.until("!flarewright.state.plate && !flarewright.under.way")
+    tab.rest()
+    assert tab.state()["view"]["exposure_stops"] is None
+    assert tab.shown().max() > 100

@@ -27,12 +27,22 @@ export function plateGroup(app) {
   const picker = h('input', { type: 'file', accept: SUFFIXES, hidden: true, name: 'plate' });
   picker.addEventListener('change', async () => { if (picker.files[0]) await app.importFile(picker.files[0]); picker.value = ''; });
   const lit = (s) => Boolean(s.plate?.lit);
+  // exposure since a lit plate was removed, and the one that undo brings back with it
+  let left = null;
+  function brought(s) {
+    if (!left || !lit(s)) return;
+    const { held, before } = left;
+    left = null;
+    if (s.view.exposure_stops === held) app.setView({ exposure_stops: before });
+  }
   async function remove() {
     const { view } = app.state;
     const wasLit = lit(app.state);
     await app.command('remove_plate', {}).catch(() => {});
     // the flare stays as bright as it was over the plate
-    if (wasLit && !app.state.plate) app.setView({ exposure_stops: view.plate_stops });
+    if (!wasLit || app.state.plate) return;
+    left = { held: view.plate_stops, before: view.exposure_stops };
+    app.setView({ exposure_stops: left.held });
   }
   const none = button('None', remove, { id: 'plate-none', tip: 'Remove the plate.' });
   const files = h('div', { class: 'row', tip: 'A photograph, or a frame of a film, under the flare: EXR, TIFF, PNG, JPEG. It can also be dropped on the page, or opened by its path. A render draws the flare alone.' }, h('label', {}, 'Picture'),
@@ -82,6 +92,7 @@ export function plateGroup(app) {
       exposure.element.hidden = !s.plate || lit(s);
       tell(s);
       look();
+      brought(s);
     },
     // Whether the panel is open: outlines are shown with it.
     open(on) { shown = on; if (on && app.state) look(); app.view.redraw(); },

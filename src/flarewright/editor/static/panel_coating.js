@@ -109,7 +109,8 @@ export function coatingPanel(app) {
       const { kind } = worn(state);
       quarter.element.hidden = kind !== 'quarter-wave';
       index.element.hidden = thick.element.hidden = kind !== 'film';
-      drawPlot(JSON.stringify([here, line(state)]));
+      // the light reaches a cemented row through the glass of the row before
+      drawPlot(JSON.stringify([here, line(state), state.lens.rows.find((each) => each.row === here - 1)]));
       const two = Boolean(app.ghost) && /^\d+-\d+$/.test(app.ghost);
       pair.hidden = !two;
       noGhost.hidden = two;
