@@ -36,8 +36,11 @@ def draw_drafts(work: GhostWork) -> GhostPass:
     """Draw the ghosts of a picture from paraxial matrices."""
     shots, paths, art = work.shots, work.paths, work.art
     points, wide = ([s for s in shots if (s.border is None) == point] for point in (True, False))
-    order = _rank_draft(shots, paths, art) if work.singles != 0 and paths else list(range(len(paths)))
-    drawing = _drawing(work, points, wide, order)
+    order, known = list(range(len(paths))), None
+    if work.singles != 0 and paths:
+        order, colors = _rank_draft(shots, paths, art)
+        known = [of_shot for shot, of_shot in zip(shots, colors, strict=True) if shot.border is None]
+    drawing = _drawing(work, points, wide, order, known)
     named = [paths[k] for k in order]
     total, layers = sum_ghosts(work, order, named, partial(_draw_group, drawing), most_chunks=_MOST_CHUNKS)
     return GhostPass(total, layers, len(paths), None, 0, 0.0, 0)
@@ -64,14 +67,19 @@ class _Drawing:
     in_bands: Callable[[int, Callable[[slice], None]], None]
 
 
-def _drawing(work: GhostWork, points: Sequence[Shot], wide: Sequence[Shot], order: Sequence[int]) -> _Drawing:
+def _drawing(
+    work: GhostWork, points: Sequence[Shot], wide: Sequence[Shot], order: Sequence[int], known: list[Floats] | None
+) -> _Drawing:
+    """Prepare the drawing of the paths in their order; `known` has the colours of all paths for each of the points."""
     alone = work.alone(order)
     changes = [work.art.get(path.name, PLAIN) for path in work.paths]
     # paths with only a colour gain are drawn with the unchanged ones
     plain = [k for k, change in enumerate(changes) if not (change.alone or change.framed or any(change.offset))]
     rgb = np.reshape([change.rgb for change in changes], (-1, 3))
     own = [work.paths[k] for k in plain]
-    colors = [draft_colors(shot, own) * rgb[plain, None] for shot in points]
+    if known is None or len(own) < len(work.paths):
+        known = [draft_colors(shot, own) for shot in points]
+    colors = [of_shot * rgb[plain, None] for of_shot in known]
     crowded = len(points) * len(plain) >= CROWDED_GHOSTS
     coarse = draft_details(points, own, colors) if crowded else None
     width, height = work.shots[0].size_px
@@ -187,15 +195,20 @@ def _add_to(planes: list[Plane | None], detail: int, light: Floats) -> None:
     planes[detail] = light if held is None else np.add(held, light, out=held, casting="same_kind")
 
 
-def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt]) -> list[int]:
-    """Sort paths by their flux in the picture: from matrices if nothing changes them, else drawn 1/16 as large."""
+def _rank_draft(
+    shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[str, PathArt]
+) -> tuple[list[int], list[Floats]]:
+    """Sort paths by their flux in the picture: from matrices if nothing changes them, else drawn 1/16 as large.
+
+    Returns also the colours of all paths for each shot.
+    """
     flux = np.zeros(len(paths))
-    for shot in shots:
+    found_colors = [draft_colors(shot, paths) for shot in shots]
+    for shot, colors in zip(shots, found_colors, strict=True):
         luminance = luminance_weights(shot.colorspace)
         small = downsampled(shot, 16)
         # a mask and an area light change how much light falls into the picture
         plain = shot.opening.mask is None and shot.border is None
-        colors = draft_colors(shot, paths)
         waves = len(shot.packed.n_gap)
         found = matrix_fluxes(shot, paths, shot.packed.n_gap, shot.packed.reflectance, sides=RIM)[0]
         # those that are dark at all traced wavelengths have weights beyond them
@@ -207,4 +220,4 @@ def _rank_draft(shots: Sequence[Shot], paths: Sequence[LightPath], art: Mapping[
             draw_overridden_draft(small, paths[k], art.get(paths[k].name, PLAIN), picture)
             sum_rows(picture, picture)
             flux[k] += luminance @ picture.sum(axis=(0, 1))
-    return [int(k) for k in np.argsort(-flux, kind="stable")]
+    return [int(k) for k in np.argsort(-flux, kind="stable")], found_colors
