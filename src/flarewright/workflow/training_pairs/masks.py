@@ -20,6 +20,8 @@ from ...typing import Floats, Pixels
 _POINT_PX = 0.5642
 # a larger disc's area is right to 0.1 % without correction
 _SMALL_PX = 8.0
+# a starburst clips mostly nearer to the light than this
+_FIRST_REACH_PX = 16.0
 
 
 @dataclass(frozen=True)
@@ -124,19 +126,56 @@ def light_mask(images: Sequence[LightImage], starburst: Pixels) -> NDArray[np.ui
     high, wide = starburst.shape[:2]
     found = np.zeros((high, wide), np.uint8)
     nearest = np.full((high, wide), np.inf, np.float32)
-    dark = np.flatnonzero(brightest_channel(starburst) < 1.0)
-    y, x = np.arange(high, dtype="f4")[:, None] + 0.5, np.arange(wide, dtype="f4")[None, :] + 0.5
     for image in images:
-        place, stretch = np.array(image.place_px, "f4"), np.float32(image.stretch)
-        far = np.hypot((x - place[0]) / stretch, y - place[1])
         radius = image.radius_px
         if image.inside((wide, high)):
-            # at least the pixel in which a small disc lies
-            radius = max(radius, float(far.min()) + 1e-3)
-            radius = max(radius, float(far.ravel()[dark].min(initial=far.max() + 1.0)) - 0.5)
-        mine = (far < radius) & (far < nearest)
-        found[mine], nearest[mine] = image.number, far[mine]
+            radius = _clipped_radius(image, starburst)
+        rows, columns = _window(image, radius, (wide, high))
+        far = _distances(image, rows, columns)
+        mine = (far < radius) & (far < nearest[rows, columns])
+        found[rows, columns][mine], nearest[rows, columns][mine] = image.number, far[mine]
     return found
+
+
+def _clipped_radius(image: LightImage, starburst: Pixels) -> float:
+    """Return the radius of the disc in which a starburst clips everywhere, at least that of the light's image."""
+    high, wide = starburst.shape[:2]
+    reach = max(_FIRST_REACH_PX, image.radius_px)
+    while True:
+        rows, columns = _window(image, reach, (wide, high))
+        far = _distances(image, rows, columns)
+        dark = brightest_channel(starburst[rows, columns]) < 1.0
+        end = float(far[dark].min(initial=np.inf))
+        whole = (rows, columns) == (slice(0, high), slice(0, wide))
+        # a pixel outside the window may be nearer than one in its corners
+        if end <= reach or whole:
+            break
+        reach *= 4.0
+    if not np.isfinite(end):
+        end = float(far.max() + 1.0)
+    # at least the pixel in which a small disc lies
+    return max(image.radius_px, float(far.min()) + 1e-3, end - 0.5)
+
+
+def _window(image: LightImage, radius: float, size_px: tuple[int, int]) -> tuple[slice, slice]:
+    """Return the rows and columns of a picture in which all pixels this near to a light's place lie."""
+    spans = []
+    for at, side, stretch in zip(image.place_px, size_px, (image.stretch, 1.0), strict=True):
+        # a light beside the picture may be far away
+        low, high = (
+            min(max(edge, -1.0), side + 1.0) for edge in (at - radius * stretch - 1.0, at + radius * stretch + 1.0)
+        )
+        first = min(max(int(np.floor(low)), 0), side)
+        spans.append(slice(first, max(first, min(int(np.ceil(high)), side))))
+    return spans[1], spans[0]
+
+
+def _distances(image: LightImage, rows: slice, columns: slice) -> Pixels:
+    """Return the distances of some pixels' centres from a light's place, pixels up and down."""
+    y, x = (np.arange(span.start, span.stop, dtype="f4") + 0.5 for span in (rows, columns))
+    place, stretch = np.array(image.place_px, "f4"), np.float32(image.stretch)
+    far: Pixels = np.hypot((x[None, :] - place[0]) / stretch, y[:, None] - place[1])
+    return far
 
 
 def ghost_mask(

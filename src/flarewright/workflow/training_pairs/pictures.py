@@ -16,7 +16,7 @@ from ...optics.lens.paraxial import focal_lengths
 from ...render.image.compose import beauty
 from ...render.render import Rendering
 from ...render.render import render as render_project
-from ...typing import Pixels
+from ...typing import Mask, Pixels
 from .background import background_of, mean_luminance
 from .draw import Drawn, brightened, draw_item, splits_of
 from .masks import LightImage, ghost_mask, light_image, light_mask
@@ -80,12 +80,17 @@ def draw_pictures(spec: DatasetSpec, index: int, backgrounds: Sequence[str], thr
     light = _light(rendering, spec.size_px, scale)
     images = _light_images(rendering, project)
     lights = light_mask(images, light["starburst"])
-    source = light["starburst"] * (lights > 0)[:, :, None]
+    source = np.zeros_like(light["starburst"])
+    # a light covers a small part of the picture
+    lit = lights > 0
+    source[lit] = light["starburst"][lit]
     singles = [layer for layer in rendering.layers if layer.name.startswith("ghost.")]
     ghosts, listed = ghost_mask(singles, spec.size_px, scale, spec.masks.threshold)
     sensor = draw_sensor(spec, index)
-    flared = background + light["starburst"] + light["ghosts"] + light["veil"]
-    clean = _clean(spec, background, source, images)
+    flared = background + light["starburst"] + light["ghosts"]
+    if spec.scatter is not None:
+        flared += light["veil"]
+    clean = _clean(spec, background, source, lit, images)
     linear = {
         "clean": exposed(clean, sensor, None if sensor.full_well_e is None else noise_of(spec, index, 1)),
         "flared": exposed(flared, sensor, None if sensor.full_well_e is None else noise_of(spec, index, 0)),
@@ -113,7 +118,10 @@ def _light(rendering: Rendering, size_px: tuple[int, int], scale: float) -> dict
 
 
 def _whole(layer: Layer | None, size_px: tuple[int, int], scale: float) -> Pixels:
-    return beauty([] if layer is None else [layer], size_px).pixels * np.float32(scale)
+    if layer is None:
+        return np.zeros((size_px[1], size_px[0], 3), np.float32)
+    whole = layer if layer.window == (0, 0, *size_px) else beauty([layer], size_px)
+    return whole.pixels * np.float32(scale)
 
 
 def _light_images(rendering: Rendering, project: Project) -> list[LightImage]:
@@ -127,13 +135,14 @@ def _light_images(rendering: Rendering, project: Project) -> list[LightImage]:
     ]
 
 
-def _clean(spec: DatasetSpec, background: Pixels, source: Pixels, images: Sequence[LightImage]) -> Pixels:
-    """Return the picture without flare."""
-    if spec.light_in_clean == "core":
-        return background + source
+def _clean(spec: DatasetSpec, background: Pixels, source: Pixels, lit: Mask, images: Sequence[LightImage]) -> Pixels:
+    """Return the picture without flare; `lit` is where `source` has light."""
     if spec.light_in_clean == "none":
         return background
     clean = background.copy()
+    if spec.light_in_clean == "core":
+        clean[lit] += source[lit]
+        return clean
     for image in images:
         window, cover = image.coverage(spec.size_px)
         part = cover[:, :, None]
