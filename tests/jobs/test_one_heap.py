@@ -1,4 +1,4 @@
-"""Threads of a process that starts as ours do allocate from one heap."""
+"""Threads of a process that starts as ours do allocate from one heap, which keeps what was freed."""
 
 from __future__ import annotations
 
@@ -44,3 +44,28 @@ def test_threads_share_one_heap(tmp_path, words, one):
     environment = {name: value for name, value in os.environ.items() if not name.startswith("MALLOC_")}
     subprocess.run([sys.executable, "-c", _COUNT_HEAPS, report, *words], env=environment, check=True)
     assert (report.read_text().count("<heap nr=") == 1) == one
+
+
+# allocates and frees what an item needs, and counts the pages that the system clears for it
+_COUNT_PAGES = """
+import resource, sys
+import numpy as np
+from flarewright.jobs.one_heap import keep_freed_memory
+if "ours" in sys.argv:
+    keep_freed_memory()
+def item():
+    [np.ones(6 << 17) for _ in range(8)]
+item()
+before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+for _ in range(4): item()
+print((resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before) * resource.getpagesize() >> 20)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other C libraries keep what they choose")
+@pytest.mark.parametrize(("words", "least", "most"), [((), 20, 200), (("ours",), 0, 5)])
+def test_freed_memory_is_kept_for_the_next_item(words, least, most):
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("MALLOC_")}
+    command = [sys.executable, "-c", _COUNT_PAGES, *words]
+    cleared_mb = int(subprocess.run(command, env=environment, check=True, capture_output=True).stdout)
+    assert least <= cleared_mb <= most

@@ -5,5 +5,5 @@
 - `answers`: `Done`, and `result_of` an answer
 - `cluster`: the workers of a Dask cluster (`open_cluster`), for `processes`
 - `worker`: `serve`, the loop of such a process
-- `one_heap`: `share_one_heap`, less memory for the threads of a process
+- `one_heap`: how a process allocates: `share_one_heap`, less memory for its threads, and `keep_freed_memory`
 """

@@ -14,7 +14,7 @@ from queue import SimpleQueue
 from threading import Lock, Thread
 from typing import Any
 
-from .one_heap import share_one_heap
+from .one_heap import keep_freed_memory, share_one_heap
 
 WRITING = Lock()
 """Held while a result is written, so that a process whose parent has ended leaves no temporary file."""
@@ -28,6 +28,7 @@ def serve() -> None:
     ("failed", traceback).
     """
     share_one_heap()
+    keep_freed_memory()
     answers = os.fdopen(os.dup(1), "wb")
     as_child()
     items: SimpleQueue[Any] = SimpleQueue()
