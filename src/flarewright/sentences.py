@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from datetime import date, time
 from typing import Any, cast, get_args
 
@@ -272,6 +272,12 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     # a cutoff of 0.6 would suggest "holdout" for "colour"
     near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.65)
     return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def listed(words: Sequence[str], most: int, noun: str = "") -> str:
+    """Return "a, b, c", or "a, b and 3 more" beyond `most` words; "and 3 more gaps" with the noun "gaps"."""
+    left = len(words) - most
+    return ", ".join(words[:most]) + (f" and {left} more {noun}".rstrip() if left > 0 else "")
 
 
 def count(number: int, noun: str, plural: str | None = None) -> str:

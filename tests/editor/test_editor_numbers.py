@@ -114,6 +114,17 @@ def test_the_sensor_stays_when_the_last_row_changes(command, row):
     assert new + changed.camera.sensor_distance == pytest.approx(whole + 24.0)
 
 
+def test_the_sensor_stays_when_a_last_stop_moves():
+    """The stop behind the lens goes in front of it, so the last glass is the last row."""
+    first, second, stop, *_ = small_zoom().rows
+    lens = small_zoom().replace(positions=(), rows=(first, second, stop), sensor_distance=25.0)
+    project = zoom_project(camera=Camera(sensor_distance=24.0)).replace(lens=lens)
+    moved = do(project, "move_stop", row=0)
+    assert isinstance(moved.lens.rows[0], Stop)
+    assert moved.lens.sensor_distance == pytest.approx(25.0 + second.thickness)
+    assert moved.camera.sensor_distance == pytest.approx(24.0 + second.thickness)
+
+
 def test_a_gap_is_that_of_the_zoom_position():
     project = do(zoom_project(), "set_fields", values={"zoom": "long"})
     assert prescription(project).rows[1]["thickness"] == "9"

@@ -19,12 +19,8 @@ def share_one_heap() -> None:
     more. Threads rarely wait for each other: kernels allocate little. MALLOC_ARENA_MAX is left to decide where it is
     set; other C libraries have one heap, or no such option.
     """
-    if sys.platform != "linux" or "MALLOC_ARENA_MAX" in os.environ:
-        return
-    import ctypes
-
-    with suppress(OSError, AttributeError):
-        ctypes.CDLL(None).mallopt(_ARENA_MAX, 1)
+    if "MALLOC_ARENA_MAX" not in os.environ:
+        _mallopt(_ARENA_MAX, 1)
 
 
 def keep_freed_memory() -> None:
@@ -32,11 +28,19 @@ def keep_freed_memory() -> None:
 
     The GNU C library returns freed memory at the end of the heap to the system, which clears it for the next item.
     """
-    if sys.platform != "linux" or any(name.startswith("MALLOC_") for name in os.environ):
+    if any(name.startswith("MALLOC_") for name in os.environ):
         return
+    # the second option alone would take all pictures apart from the heap
+    if _mallopt(_MMAP_THRESHOLD, _APART_BYTES):
+        _mallopt(_TRIM_THRESHOLD, 2**31 - 1)
+
+
+def _mallopt(option: int, value: int) -> bool:
+    """Set an option of the GNU C library; False where there is another library, or it refuses."""
+    if sys.platform != "linux":
+        return False
     import ctypes
 
     with suppress(OSError, AttributeError):
-        # the second option alone would take all pictures apart from the heap
-        if ctypes.CDLL(None).mallopt(_MMAP_THRESHOLD, _APART_BYTES):
-            ctypes.CDLL(None).mallopt(_TRIM_THRESHOLD, 2**31 - 1)
+        return bool(ctypes.CDLL(None).mallopt(option, value))
+    return False

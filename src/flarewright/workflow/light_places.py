@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import ProjectError
 from ..model import Light, LightCurve, LightKey, Project, Timeline
 from ..model.project.animation import FIRST_FRAME, LAST_FRAME, LAST_S
+from ..sentences import listed
 from ..typing import Floats
 from .keyframes import frame_rate, is_still, last_frame, light_at, project_at, still, time_of
 
@@ -228,8 +229,10 @@ def timeline_of_tracks(
     # 23.976 and 23.98 are one rate
     stated = {frame_rate(fps): fps for fps in rates}
     if len(stated) > 1:
-        listed = ", ".join(f"{fps:g}" for fps in sorted(stated.values()))
-        remarks.append(f"the tracks have {listed} frames per second and the shot {timeline.fps:g}: frames keep numbers")
+        several = ", ".join(f"{fps:g}" for fps in sorted(stated.values()))
+        remarks.append(
+            f"the tracks have {several} frames per second and the shot {timeline.fps:g}: frames keep numbers"
+        )
     if len(stated) == 1 and frame_rate(fps := rates[0]) != frame_rate(timeline.fps):
         if resting and not fps_given:
             timeline = timeline.replace(fps=fps)
@@ -381,13 +384,12 @@ def _remarks_on(track: Track, size_px: tuple[int, int], index: int) -> list[str]
         found.append(f"{label} has one frame in {steps[0]:g}: straight lines between them")
     elif (wide := np.flatnonzero(steps > 1.001)).size:
         gaps = [f"{track.frames[k] + 1:g}" + (f"-{track.frames[k + 1] - 1:g}" if steps[k] > 2.0 else "") for k in wide]
-        listed = ", ".join(gaps[:_LISTED]) + (f" and {len(gaps) - _LISTED} more gaps" if len(gaps) > _LISTED else "")
-        found.append(f"{label} has no frames {listed}: straight lines between their neighbours")
+        found.append(f"{label} has no frames {listed(gaps, _LISTED, 'gaps')}: straight lines between their neighbours")
     return found
 
 
 def _rests(track: Track, start: int, last: int, moving: bool) -> list[str]:
-    """Return a remark on frames of the shot, `start` to `last`, in which the track has ended or not begun."""
+    """Return a remark on frames of the shot, `start` to `last`, before the track starts or after it ends."""
     outside = [f"before frame {track.frames[0]:g}"] if track.frames[0] > start else []
     outside += [f"after frame {track.frames[-1]:g}"] if track.frames[-1] < last else []
     if not outside:

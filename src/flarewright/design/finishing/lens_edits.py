@@ -137,23 +137,24 @@ def _with_positions(before: Lens, after: Lens) -> Lens:
     if not before.positions:
         return after
     share = first_order(after).stop_semi_diameter / first_order(before).stop_semi_diameter
-    # positions of one focal length are settings of the focus, and keep a common one
     ratios: dict[float, float] = {}
-    positions = []
+    # positions of one focal length are settings of the focus, and keep that of the one without a distance
     for position in sorted(before.positions, key=lambda each: each.focus_distance is not None):
-        old, new = at_position(before, position), at_position(after, position)
+        if position.focal_length is None or position.focal_length in ratios:
+            continue
+        ratio = first_order(at_position(after, position)).efl / first_order(at_position(before, position)).efl
+        if ratio <= 0.0:
+            raise LensError(f"{after.name} forms no image at {position.name!r} any more; change less")
+        ratios[position.focal_length] = ratio
+    positions = []
+    for position in before.positions:
         changes = {}
         if position.focal_length is not None:
-            ratio = ratios.setdefault(position.focal_length, first_order(new).efl / first_order(old).efl)
-            if ratio <= 0.0:
-                raise LensError(f"{after.name} forms no image at {position.name!r} any more; change less")
-            changes["focal_length"] = position.focal_length * ratio
+            changes["focal_length"] = position.focal_length * ratios[position.focal_length]
         if position.f_number is not None:
-            opened = opened_to(new, 2.0 * share * first_order(old).stop_semi_diameter)
-            changes["f_number"] = opened.f_number
+            diameter = 2.0 * share * first_order(at_position(before, position)).stop_semi_diameter
+            changes["f_number"] = opened_to(at_position(after, position), diameter).f_number
         positions.append(position.replace(**changes))
-    names = [position.name for position in before.positions]
-    positions.sort(key=lambda each: names.index(each.name))
     found: Lens = after.replace(positions=tuple(positions))
     return found
 

@@ -17,6 +17,7 @@ from ...io.lens.lens_writer import write_lens
 from ...io.project.project_text import project_text
 from ...model import AsLens, Lens, Output, PerRow, Preset, Project, Quality
 from ...model.project.design import Design, GhostTarget
+from ...sentences import listed
 from ...typing import Floats
 from ..finishing.candidate import Outcome
 from ..finishing.constraints import Breach
@@ -188,9 +189,11 @@ def _of_earlier_searches(folder: Path, written: set[str]) -> list[str]:
     old = [name for name in old if name not in written]
     if not old:
         return []
-    listed = ", ".join(old[:_LISTED]) + (f" and {len(old) - _LISTED} more" if len(old) > _LISTED else "")
     are = "is" if len(old) == 1 else "are"
-    return [f"{listed} in {folder} {are} of an earlier search, and not in this report; delete what you do not need"]
+    return [
+        f"{listed(old, _LISTED)} in {folder} {are} of an earlier search, and not in this report; delete what you do "
+        "not need"
+    ]
 
 
 def write_checkpoint(folder: Path, project: Project, state: PoolState, name: str | None = None) -> None:

@@ -9,7 +9,7 @@ from ...errors import FlarewrightError
 from ...measure.replay.art import ghost_gains
 from ...measure.replay.measured_project import flare_of, is_measured
 from ...model import Art, Project, Rule
-from ...optics.lens.paths import LightPath, steps_between
+from ...optics.lens.paths import LightPath, mirrors_of, steps_between
 from ...render.scene.art_rules import resolve_art
 from ...render.scene.resolve import ResolvedProject, resolve_project
 
@@ -122,5 +122,4 @@ def _resolved(project: Project, names: Sequence[str]) -> dict[str, tuple[bool, t
 def _four(settled: ResolvedProject, name: str) -> LightPath:
     """Return the path of a ghost of four reflections."""
     count = len(settled.lens.rows)
-    rows = tuple(count if row == "sensor" else int(row) for row in name.split("-"))
-    return steps_between(count, settled.lens.stop_row, rows)
+    return steps_between(count, settled.lens.stop_row, mirrors_of(name, count))

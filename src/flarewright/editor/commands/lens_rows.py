@@ -144,9 +144,10 @@ def move_stop(project: Project, row: int) -> Project:
     stop = left.pop(old)
     if old > 0:
         left[old - 1] = left[old - 1].replace(thickness=left[old - 1].thickness + stop.thickness)
-    sensor = lens.sensor_distance
-    if old == len(left) and sensor is not None:
-        sensor += rows[old - 1].thickness
+    still = lens.replace(positions=())
+    if old == len(left):
+        # the sensor stays, and the last vertex is farther from it
+        still, project = _with_sensor_farther(still, project, rows[old - 1].thickness)
     behind = _room_behind_stop(left, target)
     if target:
         left[target - 1] = left[target - 1].replace(thickness=left[target - 1].thickness - behind)
@@ -157,7 +158,6 @@ def move_stop(project: Project, row: int) -> Project:
         return target if k == old else reduced + (reduced >= target)
 
     positions = tuple(_with_stop_at(position, lens, target, behind) for position in lens.positions)
-    still = lens.replace(positions=(), sensor_distance=sensor)
     moved = renumbered(project, still, tuple(left), place)
     return _with_positions(moved, positions)
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...errors import FlarewrightError
+from ...sentences import listed
 from .worker_side import Facts
 
 # workers that a sentence names
@@ -85,8 +86,7 @@ def check_threads(threads: Mapping[str, int], address: str) -> None:
 
 
 def _listed(noun: str, names: Sequence[str]) -> str:
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return f"{noun}{'s'[: len(names) > 1]} {', '.join(names[:_NAMED])}{more}"
+    return f"{noun}{'s'[: len(names) > 1]} {listed(names, _NAMED)}"
 
 
 def _them(names: Sequence[str]) -> str:

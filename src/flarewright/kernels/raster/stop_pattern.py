@@ -60,6 +60,14 @@ def beyond_blade(table, k, along, across):
 
 
 @inlined
+def _corner_place(table, k, beyond, other):
+    """Return column and row in a corner's table of a place at these distances beyond the corner's two blades."""
+    column = (beyond + other) * table[k, TO_ALONG] * table[k, PER_MM_X] + table[k, AT_X]
+    row = (beyond - other) * table[k, TO_ACROSS] * table[k, PER_MM_Y]
+    return column, row
+
+
+@inlined
 def _between(values, at, columns, right, down):
     """Interpolate a table bilinearly between four values, the upper left of which has index `at`."""
     # unsigned indices skip Numba's check for negative ones
@@ -97,8 +105,7 @@ def pattern_value(patterns, table, corners, k, x, y):
         j = nearest_corner(table, corners, k, x, y)
         along, across = corners[j, 0] * x + corners[j, 1] * y, abs(corners[j, 0] * y - corners[j, 1] * x)
         beyond, other = beyond_blade(table, k, along, across), beyond_blade(table, k, along, -across)
-        column = (beyond + other) * table[k, TO_ALONG] * table[k, PER_MM_X] + table[k, AT_X]
-        row = (beyond - other) * table[k, TO_ACROSS] * table[k, PER_MM_Y]
+        column, row = _corner_place(table, k, beyond, other)
         if column >= 0.0 and column < table[k, COLUMNS] - 1.001 and row < table[k, ROWS] - 1.001:
             start, columns = np.int64(table[k, FIRST]), np.int64(table[k, COLUMNS])
             return _bilinear(patterns, start, columns, column, row)
@@ -205,9 +212,8 @@ def _is_beside_corners(table, k, nx, ny, stops, count):
         # both ends of the blade folded onto one corner, as in `weave`
         along, across = p * table[k, COSINE] + q * table[k, SINE], abs(q * table[k, COSINE] - p * table[k, SINE])
         beyond, other = beyond_blade(table, k, along, across), beyond_blade(table, k, along, -across)
-        low = min(low, (beyond - other) * table[k, TO_ACROSS] * table[k, PER_MM_Y])
-        column = (beyond + other) * table[k, TO_ALONG] * table[k, PER_MM_X] + table[k, AT_X]
-        left, right = min(left, column), max(right, column)
+        column, row = _corner_place(table, k, beyond, other)
+        low, left, right = min(low, row), min(left, column), max(right, column)
     return low >= table[k, ROWS] - 1.0 or right < 0.0 or left >= table[k, COLUMNS] - 1.0
 
 

@@ -78,6 +78,11 @@ def _path(lens: Lens, mirrors: tuple[int, ...]) -> LightPath:
     return steps_between(len(lens.rows), lens.stop_row, mirrors)
 
 
+def mirrors_of(name: str, count: int) -> tuple[int, ...]:
+    """Return the mirrors in a ghost's name, for a lens with `count` rows; the sensor's number is `count`."""
+    return tuple(count if row == "sensor" else int(row) for row in name.split("-"))
+
+
 # cached: interactive previews use the same hundreds of paths for each picture
 @lru_cache(maxsize=8192)
 def steps_between(count: int, stop: int, mirrors: tuple[int, ...]) -> LightPath:

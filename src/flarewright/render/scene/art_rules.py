@@ -14,7 +14,7 @@ import numpy as np
 from ...errors import ProjectError
 from ...model import Layer, Project
 from ...model.project.art import SELECTOR, Rule
-from ...optics.lens.paths import LightPath, ghost_paths
+from ...optics.lens.paths import LightPath, ghost_paths, mirrors_of
 from ...optics.lens.tolerances import ghost_offset
 from ...optics.rays.bundle import incidence
 from ...optics.rays.ghost_table import GhostQuery, GhostTable, bounding_edges, ghost_table, pack_for_query
@@ -270,7 +270,7 @@ class _Facts:
         """Return whether a name that is not among the paths belongs to another number of reflections."""
         quality, lens = self.settled.project.quality, self.settled.lens
         count = len(lens.rows)
-        rows = [count if row == "sensor" else int(row) for row in name.split("-")]
+        rows = mirrors_of(name, count)
         if ("sensor" in name and self.settled.sensor is None) or str(count) in name.split("-"):
             return False
         if len(rows) not in (2, 4) or quality.orders == 2 or max(rows) > count or lens.stop_row in rows:

@@ -37,6 +37,7 @@ from ...io.lens.toml_lens import lens_from_table
 from ...model import Lens, Surface
 from ...optics.lens_import.patent_repair import Apertures
 from ...render.scene.resolve import open_lens
+from ...sentences import listed
 from ...typing import Progress
 from .lens_record import record_of_lens
 from .own_lenses import kept_record, library_lock, own_library
@@ -166,10 +167,9 @@ def _unread(added: Addition, reading: _Reading, makers: Mapping[str, str]) -> li
         ("--first-column", of_kind[".seq"] if reading.first_column is not None else []),
     ):
         if names:
-            listed = ", ".join(names[:_LISTED]) + (f" and {len(names) - _LISTED} more" if len(names) > _LISTED else "")
             found.append(
-                f"{flag} has no effect on lenses that the library has: {listed}; to change them, flarewright library "
-                "remove NAME, then add them again"
+                f"{flag} has no effect on lenses that the library has: {listed(names, _LISTED)}; to change them, "
+                "flarewright library remove NAME, then add them again"
             )
     return found
 

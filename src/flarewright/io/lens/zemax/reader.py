@@ -22,7 +22,7 @@ from ....errors import GlassError
 from ....model import Medium
 from ....model.lens.prescription import MOST_TERMS
 from ....model.lens.raw_lens import Configuration, RawSequence, SequenceRow
-from ....sentences import did_you_mean, shorten
+from ....sentences import did_you_mean, listed, shorten
 from ...files.door import shown
 from .. import media
 from ..foreign_file import INFINITE, MOST_SURFACES, decoded, largest_field, lens_data, number_of, sequence_row, whole
@@ -411,10 +411,8 @@ def _remark_unknown(found: Text) -> None:
     head = [key for key in found.head if key not in USED | HARMLESS | rows]
     if head:
         near = "".join(did_you_mean(key, USED) for key in head[:1])
-        more = f" and {len(head) - _LISTED} more" if len(head) > _LISTED else ""
-        found.remarks.append(
-            f"keyword{'s'[: len(head) > 1]} {', '.join(key[:20] for key in head[:_LISTED])}{more} left out{near}"
-        )
+        keys = listed([key[:20] for key in head], _LISTED)
+        found.remarks.append(f"keyword{'s'[: len(head) > 1]} {keys} left out{near}")
     cut = [key for key in VIGNETTING if any(number_of(word) for word in found.head.get(key, []))]
     if cut:
         found.remarks.append(f"vignetting factors ({', '.join(cut)}) are left out; the rims vignette")
