@@ -85,8 +85,17 @@ OTHER_COMMANDS = (
     f"predict {LENS} --samples 5 --check 0 --luminance 50,5000 --glare -o report.html",
     f"predict {LENS} --quality draft --samples 5 --check 0 --json",
     *(f"render {LENS} --light 8,4 --size 64x36 --view {view} -o view.exr" for view in ("srgb", "filmic")),
+    "dataset pairs.toml -n 1 -o pairs --processes 1",
     "edit",
 )
+# of the data set
+PAIRS = f"""
+size_px = [32, 32]
+[lens]
+names = "{LENS}"
+[sensor]
+full_well_e = 5000
+"""
 
 
 def merged(*features: dict[str, Any]) -> dict[str, Any]:
@@ -135,6 +144,7 @@ def watch(scenario: dict[str, Any] | str) -> dict[str, Any]:
             Image.new("L", (32, 32), 255).save("iris.png")
             Path("shot.toml").write_text(project_text(Project(**scenario)))
             scenario = "render --project shot.toml -o shot.exr"
+        Path("pairs.toml").write_text(PAIRS)
         assert run(scenario.split()) == 0, scenario
     return {"traits": seen[0] if seen else [], "called": called()}
 

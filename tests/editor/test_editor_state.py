@@ -19,6 +19,7 @@ from flarewright.editor.common.latest_job import Lane
 from flarewright.editor.server.uploads import take_in
 from flarewright.editor.session import history as past
 from flarewright.editor.session.autosave import Saved, autosave_path, read_autosave, write_autosave
+from flarewright.editor.session.files import command_line
 from flarewright.editor.session.session import begin
 from flarewright.editor.session.view_settings import View
 from flarewright.errors import FlarewrightError
@@ -852,3 +853,8 @@ def test_a_row_in_a_moving_gap_changes_no_position(project, row):
     for before, after in zip(lens.positions, added.positions, strict=True):
         efl = [first_order(at_position(one, position)).efl for one, position in ((lens, before), (added, after))]
         assert efl[1] == pytest.approx(efl[0], rel=1e-9)
+
+
+def test_the_command_renders_the_saved_file_as_it_is():
+    """A draft used to become final, which *Export* does not make of it."""
+    assert command_line("a shot.toml") == "flarewright render --project 'a shot.toml' -o 'a shot.exr'"

@@ -7,7 +7,15 @@ from flarewright.errors import FlarewrightError
 from flarewright.io.images.exr import CHROMATICITIES
 from flarewright.model import Layer
 from flarewright.render.image.compose import beauty
-from flarewright.render.image.display import ACESCG_TO_REC709, auto_exposure, srgb_oetf, view, view_sum, view_text
+from flarewright.render.image.display import (
+    ACESCG_TO_REC709,
+    auto_exposure,
+    srgb_codes,
+    srgb_oetf,
+    view,
+    view_sum,
+    view_text,
+)
 
 
 def rgb_to_xyz(chromaticities):
@@ -70,6 +78,19 @@ def test_the_srgb_view_leaves_what_a_screen_can_show():
     colours = np.random.default_rng(2).uniform(0.0, 1.0, (40, 40, 3)).astype(np.float32)
     exact = 255.0 * srgb_oetf(colours.astype(np.float64))
     assert np.abs(view(colours, 0.0, "srgb") - exact).max() < 0.5 + 2e-4
+
+
+def test_codes_of_single_values_are_the_nearest_and_clip_each_channel():
+    light = np.random.default_rng(2).uniform(-0.3, 1.4, (40, 30, 3)).astype(np.float32)
+    light[0, 0], light[0, 1] = np.nan, (np.inf, -np.inf, 0.0)
+    found = srgb_codes(light)
+    clipped = np.clip(np.nan_to_num(light), 0.0, 1.0)
+    np.testing.assert_array_equal(found, view(clipped, 0.0, "srgb"))
+    assert np.abs(found - 255.0 * srgb_oetf(clipped.astype(np.float64))).max() < 0.5 + 1e-4
+    assert found[0, 0].tolist() == [0, 0, 0]
+    assert found[0, 1].tolist() == [255, 0, 0]
+    # a picture in another memory order
+    np.testing.assert_array_equal(srgb_codes(light.transpose(1, 0, 2)), found.transpose(1, 0, 2))
 
 
 def test_filmic_keeps_darks_rolls_off_and_reaches_white():

@@ -146,13 +146,17 @@ def test_items_are_written_while_another_process_packs_the_last_ones_before(tmp_
     assert [path.name for path in plan.staging.iterdir()] == ["00000003.part"]
 
 
-def test_a_set_grows_but_never_mixes(whole, tmp_path):
+def test_a_set_grows_but_never_mixes(whole, tmp_path, monkeypatch):
     folder = tmp_path / "pairs"
     dataset(spec_of(), folder, items=3, processes=1)
     with pytest.raises(OutputError, match="holds a data set of 3 items; give -n 3 or more"):
         dataset(spec_of(), folder, items=2, processes=1)
     with pytest.raises(OutputError, match="holds a data set of another specification; give another folder"):
         dataset(spec_of(seed=9), folder, items=3, processes=1)
+    with monkeypatch.context() as other:
+        other.setattr(run, "_DRAWN_AS", run._DRAWN_AS + 1)
+        with pytest.raises(OutputError, match="another specification, or by another build of this version; give"):
+            dataset(spec_of(), folder, items=3, processes=1)
     grown = dataset(spec_of(), folder, items=ITEMS, processes=1)
     assert (grown.drawn, grown.kept) == (2, 3)
     assert contents(folder) == contents(whole)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from flarewright.model.project.dataset import DatasetSpec
 from flarewright.workflow.training_pairs.sensor import (
     Sensor,
+    _normal_steps,
     codes,
     draw_sensor,
     exposed,
@@ -33,6 +35,47 @@ def test_noise_has_the_variance_of_photons_and_of_reading(well, read, level):
     assert abs(found.mean() - level) < 4.0 * counts.std() / well / np.sqrt(number)
     # both variances have the relative error sqrt(2 / number)
     assert abs(found.var() / (counts.var() / well**2) - 1.0) < 4.0 * np.sqrt(4.0 / number)
+
+
+@pytest.mark.parametrize("sensor", [
+    Sensor(700.0, 4.0, 0.06, True, "linear", None), Sensor(700.0, 4.0, 0.0, False, "linear", None),
+    Sensor(None, 0.0, 0.06, False, "linear", None),
+])  # fmt: skip
+def test_the_record_follows_from_the_formula_in_every_channel(sensor):
+    rng = np.random.default_rng(7)
+    light = rng.uniform(-0.2, 1.6, (9, 7, 3)).astype(np.float32)
+    noise = rng.standard_normal(light.shape, dtype=np.float32)
+    wanted = light.astype(np.float64)
+    if sensor.full_well_e is not None:
+        electrons = np.clip(wanted, 0.0, 1.0) * sensor.full_well_e + sensor.read_noise_e**2
+        wanted = wanted + noise * np.sqrt(electrons) / sensor.full_well_e
+    wanted = sensor.black_level + (1.0 - sensor.black_level) * wanted
+    wanted = np.clip(wanted, 0.0, 1.0 if sensor.clip else None)
+    np.testing.assert_allclose(exposed(light, sensor, noise), wanted, rtol=2e-6, atol=2e-7)
+
+
+def test_noise_is_normally_distributed():
+    spec = DatasetSpec.model_validate({"size_px": (400, 300), "lens": {"names": "x"}, "sensor": {"full_well_e": 900}})
+    found = noise_of(spec, 5, 0)
+    number = found.size
+    # Kolmogorov's bound at one in a million, and the standard errors of the moments
+    assert stats.kstest(found.ravel(), "norm").statistic < np.sqrt(0.5 * np.log(2e6) / number)
+    for channel in np.moveaxis(found, 2, 0):
+        assert abs(channel.mean()) < 5.0 / np.sqrt(channel.size)
+        assert abs(channel.var() - 1.0) < 5.0 * np.sqrt(2.0 / channel.size)
+    assert abs((found.astype(np.float64) ** 4).mean() - 3.0) < 5.0 * np.sqrt(96.0 / number)
+    # neighbours, rows and channels are independent
+    for one, other in ((found[:, 1:], found[:, :-1]), (found[1:], found[:-1]), (found[..., 1:], found[..., :-1])):
+        assert abs(np.corrcoef(one.ravel(), other.ravel())[0, 1]) < 5.0 / np.sqrt(one.size)
+
+
+def test_the_steps_of_the_noise_have_the_moments_that_are_stated():
+    steps = _normal_steps().astype(np.float64)
+    assert abs(steps.mean()) < 1e-9
+    assert 1.0 - (steps**2).mean() == pytest.approx(1.5e-6, rel=0.03)
+    assert 3.0 - (steps**4).mean() == pytest.approx(1.8e-4, rel=0.03)
+    assert steps.max() == pytest.approx(4.39, abs=0.005)
+    assert (np.diff(steps) > 0.0).all()
 
 
 def test_light_above_white_clips_and_a_black_level_keeps_the_noise_of_black():

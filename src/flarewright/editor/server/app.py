@@ -245,7 +245,7 @@ def _plate_lights(workspace: Workspace, request: Request, _body: Any) -> Any:
 def _command(workspace: Workspace, _request: Request, _body: Any) -> Any:
     if workspace.session.file is None or not workspace.session.clean:
         raise ProjectError("save the project first: the command renders the file")
-    return {"text": files.command_line(workspace.session.file, workspace.session.project)}
+    return {"text": files.command_line(workspace.session.file)}
 
 
 def _export(workspace: Workspace, request: Request, _body: Any) -> Any:

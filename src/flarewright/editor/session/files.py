@@ -279,11 +279,10 @@ def save_project(
     return _stamp(data)
 
 
-def command_line(file: str, project: Project) -> str:
+def command_line(file: str) -> str:
     """Return the command that renders a saved project."""
     stem = Path(file).with_suffix("")
-    quality = " --quality final" if project.quality.mode == "draft" else ""
-    return f"flarewright render --project {shlex.quote(file)}{quality} -o {shlex.quote(f'{stem}.exr')}"
+    return f"flarewright render --project {shlex.quote(file)} -o {shlex.quote(f'{stem}.exr')}"
 
 
 def export_picture(project: Project, path: Path, progress: Progress | None = None) -> None:

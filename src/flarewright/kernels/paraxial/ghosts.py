@@ -248,7 +248,7 @@ def draw_matrix_ghosts(paths, lens, curvature_x, light, iris, mask, frame, rgb, 
 def measure_matrix_ghosts(
     paths, lens, near, curvature_x, light, iris, frame, width, height, sides, found, squares,
 ):  # fmt: skip
-    """Compute the irradiance of the ghosts of `draw_matrix_ghosts`, their flux in the picture and their rays' angles.
+    """Compute irradiance, flux in the picture and bounds of the ghosts of `draw_matrix_ghosts`, and their rays' angles.
 
     Parameters
     ----------
@@ -263,8 +263,9 @@ def measure_matrix_ghosts(
         Pixels.
     sides : int
         Edges of the polygon for the round rim of the entrance; `draw_matrix_ghosts` uses `RIM`.
-    found : ndarray, shape (P, M, 2)
-        Filled with the flux inside the picture and the flux per pixel inside the ghost.
+    found : ndarray, shape (P, M, 6)
+        Filled with the flux inside the picture, the flux per pixel inside the ghost, and the bounds of the whole ghost,
+        pixels: left, top, right, bottom; infinite and empty if it is dark.
     squares : ndarray, shape (M, steps)
         Filled with the squared sine on the lower-index side at each step of each path (`paraxial_sines`), of the rays
         from which the colours are taken.
@@ -276,7 +277,12 @@ def measure_matrix_ghosts(
         own = _lens_at(lens, m, near[m])
         for p in range(paths.starts.size - 1):
             found[p, m, 0] = found[p, m, 1] = 0.0
+            left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
             count, even = _place_ghost(paths, p, own, curvature_x, light, iris, frame, work, squares[m])
+            for k in range(count):
+                x, y = work.polygon[k, PX], work.polygon[k, PY]
+                left, top, right, bottom = min(left, x), min(top, y), max(right, x), max(bottom, y)
+            found[p, m, 2], found[p, m, 3], found[p, m, 4], found[p, m, 5] = left, top, right, bottom
             if count > 0:
                 count = cut_to_rectangle(work.polygon, count, other, values, width, height)
             if count >= 3:

@@ -8,6 +8,7 @@
 - `spread`: `spread_taps`, convolution of a picture with a small kernel
 - `edge_blur`: `spread_marks`, convolution of a picture stored as differences with a flat shape
 - `pyramid`: `collect` and `add_doubled`, from blocks at several resolutions to pixels
-- `display_codes`: `encode`, `encode_sum`, `compress_gamut`: linear light to 8-bit codes
+- `display_codes`: `encode`, `encode_clipped`, `encode_sum`, `compress_gamut`: linear light to 8-bit codes
+- `exposure`: `record`, noise, black level and clipping of a sensor
 - `perceived_hue`: `keep_hue` of a colour that is mixed with white
 """

@@ -141,6 +141,23 @@ def encode(light, gain, filmic, codes, following, out):
 
 
 @compiled
+def encode_clipped(light, codes, following, out):
+    """Convert values to display codes, each clipped to 0 and 1.
+
+    Parameters
+    ----------
+    light : ndarray, shape (N,), float32
+    codes, following
+        As in `encode_sum`.
+    out : ndarray, shape (N,), uint8
+        Filled.
+    """
+    zero, one = np.float32(0.0), np.float32(1.0)
+    for k in range(out.size):
+        out[k] = code_of(min(max(_bounded(light[k]), zero), one), codes, following)
+
+
+@compiled
 def encode_sum(ghosts, ghost_gain, rest, rest_gain, corner, filmic, codes, following, out):
     """Add two pictures and convert the sum to display codes.
 

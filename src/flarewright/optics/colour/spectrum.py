@@ -298,7 +298,15 @@ def hats(wave: Floats, nodes_nm: ArrayLike) -> Floats:
     nodes = np.atleast_1d(np.asarray(nodes_nm, dtype=np.float64))
     if nodes.ndim != 1 or nodes.size == 0 or bool(np.any(np.diff(nodes) <= 0.0)):
         raise ValueError("traced wavelengths must rise")
-    return np.stack([np.interp(wave, nodes, row) for row in np.eye(nodes.size)])
+    found = np.zeros((nodes.size, len(wave)))
+    if nodes.size == 1:
+        return found + 1.0
+    at = np.clip(wave, nodes[0], nodes[-1])
+    left = np.clip(np.searchsorted(nodes, at, side="right") - 1, 0, nodes.size - 2)
+    rising = np.where(at == nodes[-1], 1.0, (1.0 / np.diff(nodes))[left] * (at - nodes[left]))
+    column = np.arange(len(wave))
+    found[left, column], found[left + 1, column] = 1.0 - rising, rising
+    return found
 
 
 def cubics(wave: Floats, nodes_nm: ArrayLike) -> Floats:

@@ -14,14 +14,14 @@ from ...kernels.raster.polygons import sum_rows
 from ...optics.colour.rgb import luminance_weights
 from ...optics.lens.paths import LightPath
 from ...typing import Floats, Indices, Pixels
-from ..image.canvas import DETAILS, Plane
+from ..image.canvas import DETAILS, Patch, Plane
 from ..scene.area_lights import DRAFT_ROUNDING, halvings, motion, spread_border
 from ..scene.art_rules import PLAIN, PathArt
 from ..scene.shot import Shot
 from .draft_colors import draft_colors
 from .draft_spread import draft_alone, mark_spread, spread_light
-from .ghost_sums import GhostPass, GhostWork, chunks_of, sum_ghosts
-from .matrix_flux import matrix_fluxes
+from .ghost_sums import Drawn, GhostPass, GhostWork, chunks_of, sum_ghosts
+from .matrix_flux import draft_window, matrix_fluxes
 from .paraxial_ghosts import downsampled, draft_details, draw_draft, draw_draft_by_detail, draw_overridden_draft
 
 # groups of ghosts: they are drawn faster than another picture is added
@@ -90,9 +90,14 @@ def _drawing(
     return _Drawing(work, points, wide, alone, changes, place, colors, coarse, in_bands)
 
 
-def _draw_group(drawing: _Drawing, group: list[int]) -> list[Plane | None]:
+def _draw_group(drawing: _Drawing, group: list[int]) -> Drawn:
     """Draw the paths of these numbers together."""
     work, in_bands = drawing.work, drawing.in_bands
+    if len(group) == 1 and not drawing.alone.isdisjoint(group):
+        patch = _draw_alone(drawing, group[0])
+        if patch is not None:
+            work.meter.step(f"ghost {work.paths[group[0]].name}")
+            return patch
     overridden = [(work.paths[k], drawing.changes[k]) for k in group if k not in drawing.place]
     differences = _marked_points(drawing, group, overridden)
     planes: list[Plane | None] = [None if marks is None else _summed(marks, in_bands) for marks in differences]
@@ -108,6 +113,26 @@ def _draw_group(drawing: _Drawing, group: list[int]) -> list[Plane | None]:
     for k in group:
         work.meter.step(f"ghost {work.paths[k].name}")
     return planes
+
+
+def _draw_alone(drawing: _Drawing, k: int) -> Patch | None:
+    """Draw one path's ghosts of points in the part of the picture that they cover; None if more is to be drawn."""
+    if k not in drawing.place or drawing.wide:
+        return None
+    path, place = drawing.work.paths[k], drawing.place[k]
+    # a ghost with light beyond the traced wavelengths has other bounds there
+    lit = zip(drawing.points, drawing.colors, strict=True)
+    if any(colors[place, len(shot.packed.n_gap) :].any() for shot, colors in lit):
+        return None
+    left, top, right, bottom = draft_window(drawing.points, path)
+    # an empty window too has a pixel
+    marks = np.zeros((max(bottom - top, 1), max(right - left, 1), 3))
+    for shot, colors in zip(drawing.points, drawing.colors, strict=True):
+        moved = replace(shot, to_pixels=shot.to_pixels - [left, 0.0, 0.0, 0.0])
+        draw_draft(moved, [path], marks, colors[[place]], top)
+    pixels = np.empty(marks.shape, np.float32)
+    sum_rows(marks, pixels)
+    return Patch(pixels, (left, top))
 
 
 def _marked_points(

@@ -14,7 +14,7 @@ from ...model import Layer, Quality
 from ...optics.colour.rgb import luminance_weights
 from ...optics.lens.paths import LightPath
 from ...typing import Progress
-from ..image.canvas import DETAILS, Plane, lit_window, merge, to_layer
+from ..image.canvas import DETAILS, Patch, Plane, lit_window, merge, to_layer
 from ..image.ghost_ranking import GhostRanking, luminance_of
 from ..scene.art_rules import PathArt
 from ..scene.memory_check import check_memory, spare_bytes
@@ -27,6 +27,10 @@ _GHOSTS_A_CHUNK = 16
 MOST_CHUNKS = 8
 # ghosts with a separate picture that are drawn ahead of their turn, by the memory of their canvases
 _AHEAD_BYTES, _CANVAS_BYTES = 400_000_000, 30
+
+
+# what is drawn together: planes at all resolutions, or for one ghost its part of a picture
+Drawn = list[Plane | None] | Patch
 
 
 @dataclass(frozen=True)
@@ -130,8 +134,8 @@ def sum_ghosts(
     work: GhostWork,
     items: list[int],
     named: Sequence[LightPath],
-    draw: Callable[[list[int]], list[Plane | None]],
-    jobs: Sequence[Callable[[], list[Plane | None]]] = (),
+    draw: Callable[[list[int]], Drawn],
+    jobs: Sequence[Callable[[], Drawn]] = (),
     ghosts_each: int = 1,
     most_chunks: int = MOST_CHUNKS,
 ) -> tuple[Layer, tuple[Layer, ...]]:
@@ -150,14 +154,15 @@ def sum_ghosts(
     layers: list[Layer] = []
     spare, held = spare_bytes() if alone else 0.0, 0.0
     ahead = max(2, _AHEAD_BYTES // (_CANVAS_BYTES * shot.size_px[0] * shot.size_px[1]))
-    for k, planes in enumerate(_in_turn(pool, draw, [[k] for k in items[:alone]], ahead)):
-        path, pixels = named[k], merge(planes, shot.size_px)
+    for k, drawn in enumerate(_in_turn(pool, draw, [[k] for k in items[:alone]], ahead)):
+        path, patch = named[k], drawn if isinstance(drawn, Patch) else Patch(merge(drawn, shot.size_px))
+        pixels, (left, top) = patch.pixels, patch.corner
         if work.ranking is not None:
             x0, y0, x1, y1 = lit_window(pixels)
             light = luminance_of(pixels[y0:y1, x0:x1], shot.colorspace) / np.float32(pixel_area)
-            work.ranking.add(path.name, light, (x0, y0, x1 - x0, y1 - y0))
+            work.ranking.add(path.name, light, (left + x0, top + y0, x1 - x0, y1 - y0))
         if k >= kept_layers:
-            totals = _added(totals, planes)
+            totals = _added(totals, drawn, shot.size_px)
             continue
         about: dict[str, str | float] = {
             "path": path.name,
@@ -166,25 +171,25 @@ def sum_ghosts(
         }
         if path.name in work.art:
             about["art"] = work.art[path.name].text()
-        layers.append(to_layer(f"ghost.{path.name}", pixels, pixel_area, about))
+        layers.append(to_layer(f"ghost.{path.name}", patch, pixel_area, about))
         held += layers[-1].pixels.nbytes
         check_memory(held, spare)
         # the layer holds a copy, so the planes can be added in place
-        totals = _added(totals, planes)
+        totals = _added(totals, drawn, shot.size_px)
     # a single group is drawn in this thread: it may use the pool for its bands
-    for planes in (map if chunks == 1 else pool.map)(draw, [group for group in rest if group]):
-        totals = _added(totals, planes)
-    for planes in pool.map(lambda job: job(), jobs):
-        totals = _added(totals, planes)
+    for drawn in (map if chunks == 1 else pool.map)(draw, [group for group in rest if group]):
+        totals = _added(totals, drawn, shot.size_px)
+    for drawn in pool.map(lambda job: job(), jobs):
+        totals = _added(totals, drawn, shot.size_px)
     total = merge(totals, shot.size_px)
-    return to_layer("ghosts", total, pixel_area, {}, reuse=True), tuple(layers)
+    return to_layer("ghosts", Patch(total), pixel_area, {}, reuse=True), tuple(layers)
 
 
 def _in_turn(
-    pool: ThreadPoolExecutor, work: Callable[[list[int]], list[Plane | None]], items: Sequence[list[int]], ahead: int
-) -> Iterator[list[Plane | None]]:
+    pool: ThreadPoolExecutor, work: Callable[[list[int]], Drawn], items: Sequence[list[int]], ahead: int
+) -> Iterator[Drawn]:
     """Work in parallel and return the results in order; at most `ahead` of them are in memory or in the making."""
-    waiting: deque[Future[list[Plane | None]]] = deque()
+    waiting: deque[Future[Drawn]] = deque()
     for item in items:
         if len(waiting) == ahead:
             yield waiting.popleft().result()
@@ -200,10 +205,18 @@ def chunks_of(shot: Shot, ghosts: int, most_chunks: int) -> int:
     return max(1, min(most_chunks, ghosts // _GHOSTS_A_CHUNK))
 
 
-def _added(totals: Sequence[Plane | None], planes: Sequence[Plane | None]) -> list[Plane | None]:
-    """Add pictures resolution by resolution; the arrays of `totals` are overwritten."""
+def _added(totals: Sequence[Plane | None], drawn: Drawn, size_px: tuple[int, int]) -> list[Plane | None]:
+    """Add pictures resolution by resolution; the arrays of `totals` are overwritten.
+
+    A patch is added to a picture in full resolution, shape (H, W, 3).
+    """
     sums = list(totals)
-    for k, plane in enumerate(planes):
+    if isinstance(drawn, Patch):
+        whole = sums[0] if sums[0] is not None else np.zeros((size_px[1], size_px[0], 3), np.float32)
+        (x, y), (height, width) = drawn.corner, drawn.pixels.shape[:2]
+        whole[y : y + height, x : x + width] += drawn.pixels
+        return [whole, *sums[1:]]
+    for k, plane in enumerate(drawn):
         held = sums[k]
         if plane is not None:
             sums[k] = plane if held is None else np.add(held, plane, out=held)

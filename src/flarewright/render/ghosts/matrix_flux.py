@@ -53,7 +53,7 @@ def matrix_fluxes(
         to_pixels = to_pixels + np.array([FAR_PX, FAR_PX, 0.0, 0.0])
         width, height = 2 * FAR_PX, 2 * FAR_PX
     own = bent._replace(n_gap=n_gap, reflectance=reflectance)
-    found, angles = np.empty((len(paths), len(n_gap), 2)), np.empty((len(n_gap), len(joined.rows)))
+    found, angles = np.empty((len(paths), len(n_gap), 6)), np.empty((len(n_gap), len(joined.rows)))
     measure_matrix_ghosts(
         joined, own, np.arange(len(n_gap)) if near is None else near, shot.packed.curvature_x, light, iris,
         SensorFrame(axes, to_pixels, 1.0), float(width), float(height), sides, found, angles,
@@ -76,17 +76,47 @@ def weigh_drafts(shot: Shot, paths: Sequence[LightPath], colors: Floats) -> Floa
     ndarray, shape (len(paths), 2)
         Luminance of the light in the picture, and of one pixel of the ghost; 0 for a ghost that misses the picture.
     """
+    middle = len(shot.packed.n_gap) // 2
+    seen = _measured(shot, paths, [middle])[:, 0, :2]
+    light: Floats = colors.sum(axis=1) @ luminance_weights(shot.colorspace)
+    return seen * light[:, None]
+
+
+def draft_window(shots: Sequence[Shot], path: LightPath) -> tuple[int, int, int, int]:
+    """Return the part of a picture that one path's ghosts of `draw_draft` cover.
+
+    Parameters
+    ----------
+    shots : sequence of Shot
+        Of points.
+    path : LightPath
+
+    Returns
+    -------
+    tuple of int
+        Left, top, right, bottom; the first two are a pixel of the picture. right <= left or bottom <= top if no ghost
+        is in it.
+    """
+    # lights of few lines have fewer wavelengths than others
+    bounds = np.concatenate([_measured(shot, [path], range(len(shot.packed.n_gap)))[0, :, 2:] for shot in shots])
+    sides = np.array(shots[0].size_px)
+    first = np.clip(bounds[:, :2].min(axis=0), 0, sides - 1)
+    end = np.clip(np.ceil(bounds[:, 2:].max(axis=0)), 0, sides)
+    return int(first[0]), int(first[1]), int(end[0]), int(end[1])
+
+
+def _measured(shot: Shot, paths: Sequence[LightPath], waves: Sequence[int]) -> Floats:
+    """Measure the ghosts of `draw_draft` at some wavelengths (`measure_matrix_ghosts`), shape (P, M, 6)."""
+    chosen = np.array(waves)
     bent, incoming, axes = matrix_arguments(shot)
-    middle = [len(bent.n_gap) // 2]
     joined, frame = joined_paths(tuple(paths)), SensorFrame(axes, shot.to_pixels, shot.gain)
     width, height = shot.size_px
-    seen, angles = np.empty((len(paths), 1, 2)), np.empty((1, len(joined.rows)))
+    found, angles = np.empty((len(paths), len(chosen), 6)), np.empty((len(chosen), len(joined.rows)))
     measure_matrix_ghosts(
-        joined, bent._replace(n_gap=bent.n_gap[middle]), np.array(middle), shot.packed.curvature_x, incoming,
-        stop_outline(shot), frame, float(width), float(height), RIM, seen, angles,
+        joined, bent._replace(n_gap=bent.n_gap[chosen]), chosen, shot.packed.curvature_x, incoming,
+        stop_outline(shot), frame, float(width), float(height), RIM, found, angles,
     )  # fmt: skip
-    light: Floats = colors.sum(axis=1) @ luminance_weights(shot.colorspace)
-    return seen[:, 0] * light[:, None]
+    return found
 
 
 def matrix_arguments(shot: Shot) -> tuple[MeridianLens, EntranceLight, Floats]:

@@ -23,6 +23,22 @@ DETAIL_CONTRAST = (1.5e-2, 4e-3)
 
 
 @dataclass(frozen=True)
+class Patch:
+    """A part of a picture in full resolution.
+
+    Attributes
+    ----------
+    pixels : ndarray, shape (H, W, 3)
+        Flux per pixel.
+    corner : tuple of int
+        Column and row of its first pixel.
+    """
+
+    pixels: Plane
+    corner: tuple[int, int] = (0, 0)
+
+
+@dataclass(frozen=True)
 class Canvas:
     """A picture that one worker draws.
 
@@ -112,26 +128,26 @@ def blank(size_px: tuple[int, int]) -> Canvas:
 
 
 def to_layer(
-    name: str, pixels: Plane, pixel_area: float, about: dict[str, str | float], *, reuse: bool = False
+    name: str, patch: Patch, pixel_area: float, about: dict[str, str | float], *, reuse: bool = False
 ) -> Layer:
     """Crop a picture to its lit window and convert flux to irradiance.
 
     Parameters
     ----------
     name : str
-    pixels : ndarray, shape (H, W, 3)
-        Flux per pixel.
+    patch : Patch
     pixel_area : float
         mm^2.
     about : dict
     reuse : bool
-        Allow the layer to take over the memory of `pixels`.
+        Allow the layer to take over the memory of the patch.
 
     Returns
     -------
     Layer
         Its window is the smallest that contains all light; one black pixel if there is none.
     """
+    pixels, (left, top) = patch.pixels, patch.corner
     x0, y0, x1, y1 = lit_window(pixels)
     if x1 <= x0:
         return Layer(name, np.zeros((1, 1, 3), dtype=np.float32), (0, 0, 1, 1), about)
@@ -140,7 +156,7 @@ def to_layer(
     if reuse and pixels.shape == shape and pixels.dtype == np.float32:
         irradiance = pixels.astype(np.float32, copy=False)
     np.multiply(pixels[y0:y1, x0:x1], 1.0 / pixel_area, out=irradiance, casting="same_kind")
-    return Layer(name, irradiance, (x0, y0, x1 - x0, y1 - y0), about)
+    return Layer(name, irradiance, (left + x0, top + y0, x1 - x0, y1 - y0), about)
 
 
 def lit_window(pixels: Plane) -> tuple[int, int, int, int]:

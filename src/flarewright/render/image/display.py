@@ -96,6 +96,25 @@ def view(
     return out
 
 
+def srgb_codes(values: Pixels) -> NDArray[np.uint8]:
+    """Return the sRGB codes of linear values, each clipped to 0 and 1 by itself; NaN is black.
+
+    Parameters
+    ----------
+    values : ndarray, float32
+
+    Returns
+    -------
+    ndarray of the same shape, uint8
+        The nearest codes, as `view` finds them for colours that it does not change.
+    """
+    from ...kernels.raster.display_codes import encode_clipped
+
+    out = np.empty(values.shape, np.uint8)
+    encode_clipped(np.ascontiguousarray(values, np.float32).ravel(), *_tables(), out.ravel())
+    return out
+
+
 def view_sum(
     ghosts: Pixels,
     rest: Pixels,

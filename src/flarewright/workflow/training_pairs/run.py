@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 _WRITE = "flarewright.workflow.training_pairs.item:write_item"
 MOST_ITEMS = 10_000_000
+# part of every digest; raised by a change of the pixels or files of items within a version
+_DRAWN_AS = 2
 # memory of a process: that of a tiny picture, and some 40 pictures while one item is drawn and written
 _PROCESS_BYTES, _PIXEL_BYTES = 350_000_000, 480
 _LARGEST_RECORDS = 2_000_000_000
@@ -192,7 +194,7 @@ def plan_of(spec: DatasetSpec | str | PathLike[str], output: str | PathLike[str]
 
 
 def dataset_digest(spec: DatasetSpec, backgrounds: Sequence[str]) -> str:
-    """Return a digest of all that determines the items: version, specification, lenses, backgrounds."""
+    """Return a digest of all that determines the items: program, specification, lenses, backgrounds."""
     folder = Path(spec.background.folder or ".")
     lenses: dict[str, str] = {}
     images: set[str] = set()
@@ -203,6 +205,7 @@ def dataset_digest(spec: DatasetSpec, backgrounds: Sequence[str]) -> str:
     coatings = [text for text in spec.lens.coating.choice if text.lower().endswith(".toml")]
     made_of = {
         "version": __version__,
+        "drawn_as": _DRAWN_AS,
         # the place of the backgrounds does not matter
         "spec": spec.model_dump(mode="json", exclude={"background": {"folder"}}),
         "lenses": lenses,
@@ -237,6 +240,8 @@ def _claim(plan: DatasetPlan, items: int) -> None:
             raise OutputError(f"{folder} holds other files; give a new or empty folder for the data set")
         if held.get("digest") != plan.digest:
             why = "" if held.get("version") == __version__ else f", by version {held.get('version')}"
+            if not why and held.get("drawn_as") != _DRAWN_AS:
+                why = ", or by another build of this version"
             raise OutputError(
                 f"{folder} holds a data set of another specification{why}; give another folder, or remove that one"
             )
@@ -254,7 +259,8 @@ def _claim(plan: DatasetPlan, items: int) -> None:
                 raise OutputError(f"cannot make the folder {folder} ({reason}): choose another place") from None
     spec = plan.spec
     data = {
-        "schema_version": 1, "version": __version__, "digest": plan.digest, "items": items, "layout": spec.layout,
+        "schema_version": 1, "version": __version__, "drawn_as": _DRAWN_AS, "digest": plan.digest, "items": items,
+        "layout": spec.layout,
         "splits": splits_of(spec), "spec": spec.model_dump(mode="json"),
     }  # fmt: skip
     text = json.dumps(data, indent=2) + "\n"

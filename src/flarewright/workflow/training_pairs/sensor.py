@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from io import BytesIO
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kernels.raster.exposure import record
 from ...model.project.dataset import DatasetSpec, tone_gamma
-from ...render.image.display import srgb_oetf, view
+from ...render.image.display import srgb_codes, srgb_oetf
 from ...typing import Pixels
 from .draw import NOISE, SENSOR, draw_number, draw_text, stream
+
+# value of white where the sensor does not clip
+_NO_WHITE = float(np.finfo(np.float32).max)
+# of a standard normal number
+_STEPS = 1 << 16
 
 # JPEG quality of files whose specification states none
 PLAIN_QUALITY = 95
@@ -64,9 +72,21 @@ def noise_of(spec: DatasetSpec, index: int, picture: int) -> Pixels:
     Returns
     -------
     ndarray, shape (height, width, 3), float32
+        Means of 65,536 equally probable steps of the distribution, at most 4.39, in a quarter of the time of exact
+        numbers; a picture does not show the difference. The variance is 1 - 1.5e-6, the fourth moment 3 - 1.8e-4.
     """
     rng = stream(spec, index, NOISE + (picture if spec.sensor.noise == "independent" else 0))
-    return rng.standard_normal((spec.size_px[1], spec.size_px[0], 3), dtype=np.float32)
+    steps = rng.integers(0, _STEPS, (spec.size_px[1], spec.size_px[0], 3), np.uint16)
+    return _normal_steps().take(steps)
+
+
+@lru_cache(maxsize=1)
+def _normal_steps() -> Pixels:
+    """Return the mean of a standard normal number in each of `_STEPS` equally probable steps."""
+    # the mean between two ends is the difference of the densities there over the probability
+    normal = NormalDist()
+    densities = [normal.pdf(normal.inv_cdf(k / _STEPS)) for k in range(1, _STEPS)]
+    return np.asarray(-np.diff([0.0, *densities, 0.0]) * _STEPS, np.float32)
 
 
 def exposed(light: Pixels, sensor: Sensor, noise: Pixels | None = None) -> Pixels:
@@ -90,14 +110,12 @@ def exposed(light: Pixels, sensor: Sensor, noise: Pixels | None = None) -> Pixel
     The sum is drawn as one normal number of variance v F + r^2 (EMVA 1288, equation 9), which has the first two moments
     of the sum. Light beyond the full well has the noise of the full well, and clips.
     """
-    recorded = light
-    if noise is not None and sensor.full_well_e is not None:
-        well, read = np.float32(sensor.full_well_e), np.float32(sensor.read_noise_e)
-        recorded = light + noise * (np.sqrt(np.clip(light, 0.0, 1.0) * well + read * read) / well)
-    if sensor.black_level:
-        black = np.float32(sensor.black_level)
-        recorded = black + (np.float32(1.0) - black) * recorded
-    return np.clip(recorded, 0.0, 1.0) if sensor.clip else np.maximum(recorded, np.float32(0.0))
+    recorded = np.empty(light.shape, np.float32)
+    noisy = noise is not None and sensor.full_well_e is not None
+    numbers = np.ascontiguousarray(noise, np.float32).ravel() if noisy else np.empty(0, np.float32)
+    values = (sensor.full_well_e or 1.0, sensor.read_noise_e, sensor.black_level, 1.0 if sensor.clip else _NO_WHITE)
+    record(np.ascontiguousarray(light, np.float32).ravel(), numbers, *map(np.float32, values), recorded.ravel())
+    return recorded
 
 
 def codes(linear: Pixels, tone: str, bits: int) -> NDArray[Any]:
@@ -117,10 +135,10 @@ def codes(linear: Pixels, tone: str, bits: int) -> NDArray[Any]:
     ndarray, shape (H, W, 3), uint8 or uint16
     """
     gamma = tone_gamma(tone)
-    # the view would mix colours beyond white and outside the primaries with white, and 16 bits would not
-    light = np.clip(linear, 0.0, 1.0)
+    # a view would mix colours beyond white and outside the primaries with white, and 16 bits would not
     if gamma is None and bits == 8:
-        return view(light, 0.0, "srgb")
+        return srgb_codes(linear)
+    light = np.clip(linear, 0.0, 1.0)
     if gamma is None:
         light = srgb_oetf(light.astype(np.float64)).astype(np.float32)
     elif gamma != 1.0:
