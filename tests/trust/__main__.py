@@ -39,9 +39,9 @@ def rig(kinds: list[str], minutes: float, seed: int, report: Callable[[str], Non
     end, worker, done = time.monotonic() + 60.0 * minutes, Worker(), []
     spent = dict.fromkeys(kinds, 0.0)
     number = dict.fromkeys(kinds, seed)
-    while time.monotonic() < end:
+    while spent and time.monotonic() < end:
         # the kind with the least time so far: slow kinds do not crowd out quick ones
-        kind = min(kinds, key=lambda each: spent[each])
+        kind = min(spent, key=lambda each: spent[each])
         start = time.monotonic()
         tried = worker.run(kind, number[kind])
         done.append((kind, tried))
@@ -49,6 +49,9 @@ def rig(kinds: list[str], minutes: float, seed: int, report: Callable[[str], Non
             report(f"BROKEN {kind}, seed {number[kind]}: {tried.verdict.subject}: {tried.verdict.remark}")
         number[kind] += 1
         spent[kind] += time.monotonic() - start
+        if tried.verdict.skipped:
+            # the next input would lack the same
+            del spent[kind]
     worker.stop()
     return done
 
@@ -60,9 +63,10 @@ def table(done: list[tuple[str, Tried]]) -> str:
         of = [tried for each, tried in done if each == kind]
         broken = sum(not tried.verdict.held for tried in of)
         longest, peak = max(tried.cpu_s for tried in of), max(tried.peak_mb for tried in of)
-        skipped = {tried.verdict.remark for tried in of if tried.verdict.remark.startswith("skipped: ")}
+        skipped = [tried.verdict.remark for tried in of if tried.verdict.skipped]
+        number = len(of) - len(skipped)
         lines.append(
-            f"{kind:16} {len(of):7} {broken:7} {longest:6.1f} CPU s {peak:6.0f} MB  {'; '.join(skipped)}".rstrip()
+            f"{kind:16} {number:7} {broken:7} {longest:6.1f} CPU s {peak:6.0f} MB  {'; '.join(skipped)}".rstrip()
         )
     return "\n".join(lines)
 

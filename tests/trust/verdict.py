@@ -22,3 +22,8 @@ class Verdict:
     subject: str
     held: bool
     remark: str
+
+    @property
+    def skipped(self) -> bool:
+        """Whether this machine lacks something that the input needs; the remark begins with the word."""
+        return self.held and self.remark.startswith("skipped: ")

@@ -137,14 +137,13 @@ def _synthetic(size_px: tuple[int, int], rng: np.random.Generator) -> Pixels:
 
     The amplitudes of the texture fall as 1 / frequency, as those of natural pictures do (Field 1987).
     """
-    from PIL import Image
-
     wide, high = size_px
-    texture = np.zeros((high, wide), np.float32)
+    texture = np.zeros((1, 1), np.float32)
+    # from octave to octave: a smooth texture needs no large picture
     for side in _OCTAVES:
-        grid = Image.fromarray(rng.standard_normal((side, side), dtype=np.float32))
-        amplitude = np.float32(_OCTAVES[0] / side)
-        texture += amplitude * np.asarray(grid.resize(size_px, Image.Resampling.BICUBIC))
+        grid = rng.standard_normal((side, side), dtype=np.float32) * np.float32(_OCTAVES[0] / side)
+        texture = grid + _enlarged(texture, (side, side))
+    texture = _enlarged(texture, size_px)
     y = np.linspace(0.0, 1.0, high, dtype=np.float32)[:, None, None]
     horizon = float(rng.uniform(0.3, 0.7))
     sky, top, ground = (_colour(rng, *limits) for limits in ((0.15, 1.0), (0.05, 0.8), (0.02, 0.4)))
@@ -157,6 +156,12 @@ def _synthetic(size_px: tuple[int, int], rng: np.random.Generator) -> Pixels:
         picture[max(0, base - height) : base, left : left + width] = _colour(rng, 0.01, 0.6)
     picture *= np.exp(np.float32(rng.uniform(0.1, 0.5)) * texture)[:, :, None]
     return picture
+
+
+def _enlarged(plane: Pixels, size_px: tuple[int, int]) -> Pixels:
+    from PIL import Image
+
+    return np.asarray(Image.fromarray(plane).resize(size_px, Image.Resampling.BICUBIC))
 
 
 def _colour(rng: np.random.Generator, least: float, largest: float) -> Floats:

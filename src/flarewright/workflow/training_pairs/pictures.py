@@ -16,7 +16,7 @@ from ...optics.lens.paraxial import focal_lengths
 from ...render.image.compose import beauty
 from ...render.render import Rendering
 from ...render.render import render as render_project
-from ...typing import Mask, Pixels
+from ...typing import Pixels
 from .background import background_of, mean_luminance
 from .draw import Drawn, brightened, draw_item, splits_of
 from .masks import LightImage, ghost_mask, light_image, light_mask
@@ -80,17 +80,15 @@ def draw_pictures(spec: DatasetSpec, index: int, backgrounds: Sequence[str], thr
     light = _light(rendering, spec.size_px, scale)
     images = _light_images(rendering, project)
     lights = light_mask(images, light["starburst"])
-    source = np.zeros_like(light["starburst"])
-    # a light covers a small part of the picture
-    lit = lights > 0
-    source[lit] = light["starburst"][lit]
+    source = _on_lights(light["starburst"], lights)
     singles = [layer for layer in rendering.layers if layer.name.startswith("ghost.")]
     ghosts, listed = ghost_mask(singles, spec.size_px, scale, spec.masks.threshold)
     sensor = draw_sensor(spec, index)
-    flared = background + light["starburst"] + light["ghosts"]
+    flared = background + light["starburst"]
+    flared += light["ghosts"]
     if spec.scatter is not None:
         flared += light["veil"]
-    clean = _clean(spec, background, source, lit, images)
+    clean = _clean(spec, background, source, images)
     linear = {
         "clean": exposed(clean, sensor, None if sensor.full_well_e is None else noise_of(spec, index, 1)),
         "flared": exposed(flared, sensor, None if sensor.full_well_e is None else noise_of(spec, index, 0)),
@@ -135,14 +133,24 @@ def _light_images(rendering: Rendering, project: Project) -> list[LightImage]:
     ]
 
 
-def _clean(spec: DatasetSpec, background: Pixels, source: Pixels, lit: Mask, images: Sequence[LightImage]) -> Pixels:
-    """Return the picture without flare; `lit` is where `source` has light."""
+def _on_lights(starburst: Pixels, lights: NDArray[np.uint8]) -> Pixels:
+    """Return the part of a starburst that lies on the mask of the lights, black elsewhere."""
+    source = np.zeros_like(starburst)
+    # lights cover a small part of the picture
+    rows, columns = (np.flatnonzero(lights.any(axis=axis)) for axis in (1, 0))
+    if rows.size:
+        window = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+        np.copyto(source[window], starburst[window], where=lights[window][:, :, None] > 0)
+    return source
+
+
+def _clean(spec: DatasetSpec, background: Pixels, source: Pixels, images: Sequence[LightImage]) -> Pixels:
+    """Return the picture without flare."""
     if spec.light_in_clean == "none":
         return background
-    clean = background.copy()
     if spec.light_in_clean == "core":
-        clean[lit] += source[lit]
-        return clean
+        return background + source
+    clean = background.copy()
     for image in images:
         window, cover = image.coverage(spec.size_px)
         part = cover[:, :, None]
