@@ -128,18 +128,19 @@ def _transform(
     1 / period, so the sums are FFTs. Terms a whole period apart have the same phases.
     """
     folds = -(-len(q) // period)
-    padded = np.zeros((folds * period, spectrum.shape[1]))
-    padded[: len(q)] = spectrum
-    at = np.arange(len(padded)) * q[1]
-    over = np.zeros(len(padded))
-    over[1:] = 0.5 / (math.pi * at[1:])
-    integrals = np.empty((len(boxes), len(v), spectrum.shape[1]))
+    over = np.zeros(len(q))
+    over[1:] = 0.5 / (math.pi * q[1:])
+    channels = spectrum.shape[1]
+    # a row for each transform; what follows the spectrum stays 0
+    both = np.zeros((2 * channels, folds * period))
+    divided, seen = both[:channels, : len(q)], both[channels:, : len(q)]
+    integrals = np.empty((len(boxes), len(v), channels))
     values = np.empty_like(integrals)
     for n, (one, other) in enumerate(boxes):
-        seen = (np.sinc(one * at) * np.sinc(other * at))[:, None] * padded
-        both = np.concatenate([seen * over[:, None], seen], axis=1)
-        summed = np.fft.rfft(both.reshape(folds, period, -1).sum(axis=0), axis=0)[: len(v)]
+        seen[:] = np.sinc(one * q) * np.sinc(other * q) * spectrum.T
+        divided[:] = seen * over
+        summed = np.fft.rfft(both.reshape(len(both), folds, period).sum(axis=1), axis=1)[:, : len(v)]
         # sin(2 pi q v) / (2 pi q) tends to v at q = 0
-        integrals[n] = v[:, None] * seen[0] - summed[:, : spectrum.shape[1]].imag
-        values[n] = summed[:, spectrum.shape[1] :].real
+        integrals[n] = v[:, None] * seen[:, 0] - summed[:channels].imag.T
+        values[n] = summed[channels:].real.T
     return integrals, values
