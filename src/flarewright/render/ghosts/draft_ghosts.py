@@ -130,9 +130,7 @@ def _draw_alone(drawing: _Drawing, k: int) -> Patch | None:
     for shot, colors in zip(drawing.points, drawing.colors, strict=True):
         moved = replace(shot, to_pixels=shot.to_pixels - [left, 0.0, 0.0, 0.0])
         draw_draft(moved, [path], marks, colors[[place]], top)
-    pixels = np.empty(marks.shape, np.float32)
-    sum_rows(marks, pixels)
-    return Patch(pixels, (left, top))
+    return Patch(_summed(marks, drawing.in_bands), (left, top))
 
 
 def _marked_points(

@@ -80,7 +80,7 @@ def draw_pictures(spec: DatasetSpec, index: int, backgrounds: Sequence[str], thr
     light = _light(rendering, spec.size_px, scale)
     images = _light_images(rendering, project)
     lights = light_mask(images, light["starburst"])
-    source = _on_lights(light["starburst"], lights)
+    source = np.where(lights[:, :, None] > 0, light["starburst"], np.float32(0.0))
     singles = [layer for layer in rendering.layers if layer.name.startswith("ghost.")]
     ghosts, listed = ghost_mask(singles, spec.size_px, scale, spec.masks.threshold)
     sensor = draw_sensor(spec, index)
@@ -131,17 +131,6 @@ def _light_images(rendering: Rendering, project: Project) -> list[LightImage]:
         for number, (light, facts) in enumerate(zip(project.lights, summary["lights"], strict=True), 1)
         if light.intensity > 0.0
     ]
-
-
-def _on_lights(starburst: Pixels, lights: NDArray[np.uint8]) -> Pixels:
-    """Return the part of a starburst that lies on the mask of the lights, black elsewhere."""
-    source = np.zeros_like(starburst)
-    # lights cover a small part of the picture
-    rows, columns = (np.flatnonzero(lights.any(axis=axis)) for axis in (1, 0))
-    if rows.size:
-        window = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-        np.copyto(source[window], starburst[window], where=lights[window][:, :, None] > 0)
-    return source
 
 
 def _clean(spec: DatasetSpec, background: Pixels, source: Pixels, images: Sequence[LightImage]) -> Pixels:
