@@ -11,9 +11,11 @@ from flarewright.model import Camera, Light, Project, Quality
 from flarewright.optics.lens.paths import ghost_paths
 from flarewright.optics.rays.bundle import Refinement, trace_bundle, trace_grid
 from flarewright.optics.rays.path_reflectance import CURVE_NM
+from flarewright.render.ghosts import steep_ghosts
 from flarewright.render.ghosts.matrix_flux import matrix_fluxes
 from flarewright.render.ghosts.steep_ghosts import (
     ABRUPT_PART,
+    bent_spectrum,
     ends,
     gaps_at_ends,
     light_up_to_its_end,
@@ -24,7 +26,7 @@ from flarewright.render.scene.between_wavelengths import FINE_NM
 from flarewright.render.scene.opening import make_opening
 from flarewright.render.scene.path_color import areas_between, visible_rays
 from flarewright.render.scene.resolve import resolve_project
-from flarewright.render.scene.shot import at_fine_wavelengths
+from flarewright.render.scene.shot import at_fine_wavelengths, seen_light
 from flarewright.render.scene.shots import make_shots
 
 
@@ -54,6 +56,38 @@ def test_interpolated_rays_pass_where_traced_ones_do(name):
     held = sorted(bundle.traced)
     at_held = areas_between(shot, bundle, shot.packed.wavelengths_nm[held], item.to_pixels)
     np.testing.assert_allclose(at_held, [sum(third[half(bundle.traced[w])].sum() for half in seen) for w in held])
+
+
+@pytest.mark.parametrize(
+    ("lens", "f_number", "field", "name"),
+    [
+        ("canon-28-80", 8.0, (10.0, 5.0), "14-0"),
+        ("canon-28-80", 8.0, (10.0, 5.0), "27-22"),
+        ("takumar-50-f1.4", 4.0, (-9.0, 5.0), "13-0"),
+    ],
+)
+def test_few_traced_wavelengths_give_the_colours_of_all(monkeypatch, lens, f_number, field, name):
+    project = Project(
+        lens=lens, f_number=f_number, lights=(Light(field_deg=field),), camera=Camera(size_px=(640, 360)),
+        quality=Quality(mode="final", wavelengths=3),
+    )  # fmt: skip
+    settled = resolve_project(project)
+    (shot,) = make_shots(settled, make_opening(settled, None))
+    (path,) = (path for path in ghost_paths(settled.lens) if path.name == name)
+    fine, opening, tilt = at_fine_wavelengths(shot), shot.opening, shot.incidence.tilt
+    item = find_final(fine, path)
+    detail = Refinement(float(shot.to_pixels[2]), view_radius=item.view_radius)
+    grid = trace_grid(fine.packed, path, tilt, (opening.radius, opening.inner), item.region, detail)
+
+    def color() -> np.ndarray:
+        return bent_spectrum(shot, fine, grid, None, item.to_pixels).passed @ seen_light(shot)
+
+    few = color()
+    monkeypatch.setattr(steep_ghosts, "RAY_STRIDE", 1)
+    every = color()
+    plain = np.ones(len(CURVE_NM)) @ seen_light(shot)
+    assert np.abs(few - every).max() < 0.005 * np.abs(every).max()
+    assert np.abs(plain - every).max() > 0.02 * np.abs(every).max()
 
 
 def test_wavelengths_are_added_where_light_ends():

@@ -233,7 +233,7 @@ def areas_between(shot: Shot, bundle: Bundle, wavelengths_nm: Floats, to_pixels:
     """
     held = sorted(bundle.traced)
     held_nm = shot.packed.wavelengths_nm[held]
-    shares = _lagrange(tuple(held_nm**-2.0), tuple(wavelengths_nm**-2.0))
+    shares = lagrange(tuple(held_nm**-2.0), tuple(wavelengths_nm**-2.0))
     nearest = np.abs(held_nm - wavelengths_nm[:, None]).argmin(axis=1)
     axes, places = _frames(shot, pixel_frame(shot, to_pixels), bundle.halves)
     width, height = (float(side) for side in shot.size_px)
@@ -245,8 +245,24 @@ def areas_between(shot: Shot, bundle: Bundle, wavelengths_nm: Floats, to_pixels:
 
 
 @lru_cache(maxsize=64)
-def _lagrange(nodes: tuple[float, ...], places: tuple[float, ...]) -> Floats:
-    """Return the weights of values at nodes for the polynomial through them at other places, shape (M, N)."""
+def lagrange(nodes: tuple[float, ...], places: tuple[float, ...]) -> Floats:
+    """Return the weights of values at nodes for the polynomial through them at other places.
+
+    Parameters
+    ----------
+    nodes : tuple of float, N of them
+    places : tuple of float, M of them
+
+    Returns
+    -------
+    ndarray, shape (M, N)
+        Lagrange's formula (Abramowitz and Stegun 1964, 25.2.2).
+
+    Examples
+    --------
+    >>> lagrange((0.0, 1.0), (0.25,))
+    array([[0.75, 0.25]])
+    """
     weights = np.ones((len(places), len(nodes)))
     for j, k in permutations(range(len(nodes)), 2):
         weights[:, j] *= (np.array(places) - nodes[k]) / (nodes[j] - nodes[k])
