@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flarewright.model import Camera, Light, Project, Quality
+from flarewright.model import Camera, Light, Lines, Project, Quality
 from flarewright.optics.lens.paths import ghost_paths
-from flarewright.optics.rays.bundle import Refinement, trace_bundle, trace_grid
+from flarewright.optics.rays.bundle import Bundle, Refinement, trace_bundle, trace_grid
 from flarewright.optics.rays.path_reflectance import CURVE_NM
 from flarewright.render.ghosts import steep_ghosts
+from flarewright.render.ghosts.final_pass import FinalPass
 from flarewright.render.ghosts.matrix_flux import matrix_fluxes
 from flarewright.render.ghosts.steep_ghosts import (
     ABRUPT_PART,
@@ -26,8 +27,20 @@ from flarewright.render.scene.between_wavelengths import FINE_NM
 from flarewright.render.scene.opening import make_opening
 from flarewright.render.scene.path_color import areas_between, visible_rays
 from flarewright.render.scene.resolve import resolve_project
-from flarewright.render.scene.shot import at_fine_wavelengths, seen_light
+from flarewright.render.scene.shot import Shot, at_fine_wavelengths, seen_light
 from flarewright.render.scene.shots import make_shots
+
+
+def _grid(project: Project, name: str, *, fine: bool = False) -> tuple[Shot, FinalPass, Bundle]:
+    """Return the shot of a project, a ghost, and its grid, both at more wavelengths if `fine`."""
+    settled = resolve_project(project)
+    (shot,) = make_shots(settled, make_opening(settled, None))
+    (path,) = (path for path in ghost_paths(settled.lens) if path.name == name)
+    own = at_fine_wavelengths(shot) if fine else shot
+    item, opening = find_final(own, path), shot.opening
+    detail = Refinement(float(shot.to_pixels[2]), view_radius=item.view_radius)
+    tilt, radii = shot.incidence.tilt, (opening.radius, opening.inner)
+    return shot, item, trace_grid(own.packed, path, tilt, radii, item.region, detail)
 
 
 @pytest.mark.parametrize("name", ["13-0", "4-1", "13-3"])
@@ -36,12 +49,8 @@ def test_interpolated_rays_pass_where_traced_ones_do(name):
         lens="takumar-50-f1.4", f_number=4.0, lights=(Light(field_deg=(-9.0, 5.0)),), camera=Camera(size_px=(96, 54)),
         quality=Quality(mode="final", wavelengths=7),
     )  # fmt: skip
-    settled = resolve_project(project)
-    (shot,) = make_shots(settled, make_opening(settled, None))
-    (path,) = (path for path in ghost_paths(settled.lens) if path.name == name)
-    item, opening, tilt = find_final(shot, path), shot.opening, shot.incidence.tilt
-    detail = Refinement(float(shot.to_pixels[2]), view_radius=item.view_radius)
-    bundle = trace_grid(shot.packed, path, tilt, (opening.radius, opening.inner), item.region, detail)
+    shot, item, bundle = _grid(project, name)
+    tilt = shot.incidence.tilt
     fine, seen = at_fine_wavelengths(shot).packed, visible_rays(shot, item.to_pixels, bundle.halves)
     alone = replace(bundle, traced={})
     a, b, c = np.moveaxis(bundle.pupil[bundle.triangles], 1, 0)
@@ -71,16 +80,10 @@ def test_few_traced_wavelengths_give_the_colours_of_all(monkeypatch, lens, f_num
         lens=lens, f_number=f_number, lights=(Light(field_deg=field),), camera=Camera(size_px=(640, 360)),
         quality=Quality(mode="final", wavelengths=3),
     )  # fmt: skip
-    settled = resolve_project(project)
-    (shot,) = make_shots(settled, make_opening(settled, None))
-    (path,) = (path for path in ghost_paths(settled.lens) if path.name == name)
-    fine, opening, tilt = at_fine_wavelengths(shot), shot.opening, shot.incidence.tilt
-    item = find_final(fine, path)
-    detail = Refinement(float(shot.to_pixels[2]), view_radius=item.view_radius)
-    grid = trace_grid(fine.packed, path, tilt, (opening.radius, opening.inner), item.region, detail)
+    shot, item, grid = _grid(project, name, fine=True)
 
     def color() -> np.ndarray:
-        return bent_spectrum(shot, fine, grid, None, item.to_pixels).passed @ seen_light(shot)
+        return bent_spectrum(shot, item.shot, grid, None, item.to_pixels).passed @ seen_light(shot)
 
     few = color()
     monkeypatch.setattr(steep_ghosts, "RAY_STRIDE", 1)
@@ -88,6 +91,19 @@ def test_few_traced_wavelengths_give_the_colours_of_all(monkeypatch, lens, f_num
     plain = np.ones(len(CURVE_NM)) @ seen_light(shot)
     assert np.abs(few - every).max() < 0.005 * np.abs(every).max()
     assert np.abs(plain - every).max() > 0.02 * np.abs(every).max()
+
+
+def test_lines_are_all_traced(monkeypatch):
+    light = Light(field_deg=(-9.0, 5.0), spectrum=Lines(lines=((436.0, 1.0), (546.0, 1.0), (650.0, 1.0), (656.0, 1.0))))
+    project = Project(
+        lens="takumar-50-f1.4", f_number=4.0, lights=(light,), camera=Camera(size_px=(640, 360)),
+        quality=Quality(mode="final", wavelengths=3),
+    )  # fmt: skip
+    shot, item, grid = _grid(project, "13-0", fine=True)
+    few = bent_spectrum(shot, item.shot, grid, None, item.to_pixels).passed
+    monkeypatch.setattr(steep_ghosts, "lagrange", None)
+    assert (bent_spectrum(shot, item.shot, grid, None, item.to_pixels).passed == few).all()
+    assert np.ptp(few) > 0.05
 
 
 def test_wavelengths_are_added_where_light_ends():
