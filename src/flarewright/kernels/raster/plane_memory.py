@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 # smaller planes fit into few pages
 _LEAST_BYTES = 4 * 2**20
+# size of a huge page; where it is larger, planes just lie in small pages
+_HUGE_BYTES = 2 * 2**20
 
 
 def black_memory(count: int) -> NDArray[np.float32]:
@@ -34,8 +36,28 @@ def black_memory(count: int) -> NDArray[np.float32]:
     system: Any = mmap
     if 4 * count < _LEAST_BYTES or not hasattr(system, "MADV_HUGEPAGE"):
         return np.zeros(count, dtype=np.float32)
-    block = system.mmap(-1, 4 * count, flags=system.MAP_PRIVATE | system.MAP_ANONYMOUS)
+    # whole huge pages, and space to begin at one: each end would else lie in hundreds of small pages, which cost more
+    # than all the huge ones together. What is never written takes no memory
+    size = -(-4 * count // _HUGE_BYTES) * _HUGE_BYTES
+    block = system.mmap(-1, size + _HUGE_BYTES, flags=system.MAP_PRIVATE | system.MAP_ANONYMOUS)
     # a system without huge pages refuses; small pages do as well
     with suppress(OSError):
         block.madvise(system.MADV_HUGEPAGE)
-    return np.frombuffer(block, dtype=np.float32, count=count)
+    floats: NDArray[np.float32] = np.frombuffer(block, dtype=np.float32)
+    start = -floats.ctypes.data % _HUGE_BYTES // floats.itemsize
+    return floats[start : start + count]
+
+
+def black_picture(width: int, height: int) -> NDArray[np.float32]:
+    """Return a black picture in such memory.
+
+    Parameters
+    ----------
+    width, height : int
+        Pixels.
+
+    Returns
+    -------
+    ndarray of float32, shape (height, width, 3)
+    """
+    return black_memory(3 * width * height).reshape(height, width, 3)

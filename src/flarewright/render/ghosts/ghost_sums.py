@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...kernels.raster.plane_memory import black_picture
 from ...model import Layer, Quality
 from ...optics.colour.rgb import luminance_weights
 from ...optics.lens.paths import LightPath
@@ -212,7 +213,7 @@ def _added(totals: Sequence[Plane | None], drawn: Drawn, size_px: tuple[int, int
     """
     sums = list(totals)
     if isinstance(drawn, Patch):
-        whole = sums[0] if sums[0] is not None else np.zeros((size_px[1], size_px[0], 3), np.float32)
+        whole = sums[0] if sums[0] is not None else black_picture(*size_px)
         (x, y), (height, width) = drawn.corner, drawn.pixels.shape[:2]
         whole[y : y + height, x : x + width] += drawn.pixels
         return [whole, *sums[1:]]

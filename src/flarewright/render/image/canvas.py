@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...kernels.raster.plane_memory import black_picture
 from ...kernels.raster.polygons import BLOCK, blank_plane
 from ...kernels.raster.pyramid import add_doubled, collect
 from ...model import Layer
@@ -112,14 +113,14 @@ def merge(planes: Sequence[Plane | None], size_px: tuple[int, int]) -> Plane:
         plane, coarse = planes[detail], total
         if plane is None and coarse is None:
             continue
-        total = np.zeros((height, width, 3), dtype=np.float32)
+        total = black_picture(width, height)
         if plane is not None and plane.ndim == 3:
             total += plane
         elif plane is not None:
             collect(plane, total)
         if coarse is not None:
             add_doubled(coarse, total)
-    return np.zeros((size_px[1], size_px[0], 3), dtype=np.float32) if total is None else total
+    return black_picture(*size_px) if total is None else total
 
 
 def blank(size_px: tuple[int, int]) -> Canvas:

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ...io.images.mask_image import read_mask
+from ...kernels.raster.plane_memory import black_picture
 from ...model import Art, Iris, Lens, Light, Project
 from ...optics.lens.paths import ghost_paths
 from ...typing import Floats, Pixels
@@ -99,7 +100,7 @@ class DragPicture:
     def rest(self) -> Pixels:
         """The sum of all starbursts in the picture."""
         height, width = self.ghosts.shape[:2]
-        total = np.zeros((height, width, 3), dtype=np.float32)
+        total = black_picture(width, height)
         for star in self.stars:
             top, left = star.corner
             total += star.sheet.pixels[top : top + height, left : left + width] * np.array(star.gain, dtype=np.float32)
@@ -152,7 +153,7 @@ def moving_picture(project: Project, kept: Sequence[StarburstCanvas]) -> DragPic
     width, height = shots[0].size_px
     if ghosts.shape[:2] != (height, width):
         x, y, w, h = layer.window
-        whole = np.zeros((height, width, 3), dtype=np.float32)
+        whole = black_picture(width, height)
         whole[y : y + h, x : x + w] = ghosts
         ghosts = whole
     return DragPicture(ghosts, tuple(stars))

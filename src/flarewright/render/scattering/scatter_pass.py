@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernels.raster.iris_mask import StopArrays
+from ...kernels.raster.plane_memory import black_picture
 from ...kernels.scattering.single_scatter import (
     FLUX,
     DirectBeam,
@@ -185,7 +186,7 @@ def render_scatter(
     reflected before or after, or scattered twice or from a reflection, is ignored.
     """
     width, height = shots[0].size_px
-    total = np.zeros((height, width, 3), dtype=np.float32)
+    total = black_picture(width, height)
     sampling = COARSE if settled.project.quality.mode == "draft" else FINE
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         for done, (shot, image, table) in enumerate(zip(shots, images, tables, strict=True)):
@@ -214,10 +215,10 @@ def _one_light(
     level = light.mean(axis=0)
     brightest = float(level.max())
     if brightest <= 0.0:
-        return np.zeros((shot.size_px[1], shot.size_px[0], 3), dtype=np.float32)
+        return black_picture(*shot.size_px)
     level = np.maximum(level, 1e-12 * brightest)
     colour = np.einsum("wab,wc->abc", light, rgb) / level[..., None] * shot.gain
-    pixels = np.empty((shot.size_px[1], shot.size_px[0], 3), dtype=np.float32)
+    pixels = black_picture(*shot.size_px)
     step = len(angles) / (2.0 * pi) if round_about else (len(angles) - 1) / float(angles[-1] - angles[0])
     spread_polar(centre, round_about, first, (float(angles[0]), step), np.log(level), colour, shot.to_pixels, pixels)
     return pixels

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernels.diffraction import wings as kernel
+from ...kernels.raster.plane_memory import black_picture
 from ...optics.diffraction.fraunhofer import BladeWings, FanWings, Pattern
 from ...optics.diffraction.spike_profile import SpikeProfile, spike_profile
 from ...typing import Floats, Indices, Pixels
@@ -88,7 +89,7 @@ def draw_stars(
         As from `pattern.starburst_layer`.
     """
     width, height = size_px
-    total = np.zeros((height, width, 3), dtype=np.float32)
+    total = black_picture(width, height)
     painter = painter_of(stars.pattern, stars.f_number, pixel_mm, stars.wavelengths_nm, stars.weights)
     reach = max(NEAR_PIXELS + 1, math.ceil(painter.outer / min(pixel_mm)) + 1)
     windows = _windows(stars.centres_px, reach)

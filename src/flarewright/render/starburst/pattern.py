@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ...errors import ProjectError
 from ...kernels.diffraction.resample import SpikeTables, blend_blade_wings, blend_fan_wings, deposit_core
+from ...kernels.raster.plane_memory import black_picture
 from ...optics.diffraction.fraunhofer import BladeWings, FanWings, Pattern
 from ...optics.diffraction.spike_profile import spike_profile
 from ...optics.pupil.dirt import VeilTerm
@@ -100,7 +101,7 @@ def starburst_layer(
     cx, cy = centre_px
     x_edges = (np.arange(width + 1, dtype=np.float64) - cx) * pixel_mm[0]
     y_edges = (cy - np.arange(height + 1, dtype=np.float64)) * pixel_mm[1]
-    picture = np.zeros((height, width, 3), dtype=np.float32)
+    picture = black_picture(width, height)
     strength = np.abs(weights).max(axis=1)
     if not strength.any():
         return picture

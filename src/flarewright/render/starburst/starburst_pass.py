@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...colorimetry import VISIBLE_NM
 from ...errors import ProjectError, raised_as
 from ...io.images.mask_image import read_mask
+from ...kernels.raster.plane_memory import black_picture
 from ...model import Dirt, Iris, Layer, Lines, Starburst
 from ...optics.diffraction.fraunhofer import BladeWings, Pattern, Soil, pupil_pattern
 from ...optics.lens.paths import direct_path
@@ -104,7 +105,7 @@ def starburst_of(
     look = Starburst(cats_eye=project.starburst.cats_eye) if physical else project.starburst
     scene = _Scene(settled, mask, soil, look)
     width, height = shots[0].size_px
-    total = np.zeros((height, width, 3), dtype=np.float32)
+    total = black_picture(width, height)
     pairs = [pair for pair in zip(shots, images, strict=True) if project.lights[pair[0].number].starburst]
     lights = [list(of_one) for _, of_one in groupby(pairs, lambda pair: pair[0].number)]
     groups, others = _group_by_pattern(scene, lights)
@@ -158,7 +159,7 @@ def _many_lights(scene: _Scene, group: list[tuple[Shot, DirectImage]], threads: 
     strength = scene.look.intensity * pattern.transmittance / stretch
     pixel = (1.0 / float(pixels[2]) / stretch, 1.0 / float(pixels[3]))
     draft = scene.settled.project.quality.mode == "draft"
-    total: NDArray[np.floating] = np.zeros((shot.size_px[1], shot.size_px[0], 3), dtype=np.float32)
+    total: NDArray[np.floating] = black_picture(*shot.size_px)
     for k, number in enumerate(chosen):
         own = Stars(pattern, f_number, fine_nm, colors[number] * strength, places[fits], gains[fits, k])
         total += draw_stars(own, pixel, shot.size_px, draft=draft, threads=threads)
