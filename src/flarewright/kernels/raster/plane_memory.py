@@ -49,12 +49,12 @@ def black_memory(count: int) -> NDArray[np.float32]:
 
 
 def black_picture(width: int, height: int) -> NDArray[np.float32]:
-    """Return a black picture in such memory.
+    """Return a black picture in memory from `black_memory`.
 
     Parameters
     ----------
     width, height : int
-        Pixels.
+        Number of columns and of rows.
 
     Returns
     -------
