@@ -43,3 +43,8 @@ def test_a_system_that_refuses_huge_pages_gives_small_ones(monkeypatch):
     memory = black_memory(2**21)
     memory[-1] = 2.0
     assert memory.sum() == 2.0
+
+
+def test_a_lack_of_memory_is_a_memory_error():
+    with pytest.raises(MemoryError):
+        black_memory(2**58)

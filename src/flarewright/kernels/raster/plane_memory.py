@@ -31,6 +31,11 @@ def black_memory(count: int) -> NDArray[np.float32]:
     Returns
     -------
     ndarray of float32, shape (count,)
+
+    Raises
+    ------
+    MemoryError
+        There is not so much memory.
     """
     # typed as Any: only some systems have these names
     system: Any = mmap
@@ -39,7 +44,11 @@ def black_memory(count: int) -> NDArray[np.float32]:
     # whole huge pages, and space to begin at one: each end would else lie in hundreds of small pages, which cost more
     # than all the huge ones together. What is never written takes no memory
     size = -(-4 * count // _HUGE_BYTES) * _HUGE_BYTES
-    block = system.mmap(-1, size + _HUGE_BYTES, flags=system.MAP_PRIVATE | system.MAP_ANONYMOUS)
+    try:
+        block = system.mmap(-1, size + _HUGE_BYTES, flags=system.MAP_PRIVATE | system.MAP_ANONYMOUS)
+    except OSError:
+        # the C library may hold enough that was freed; else this raises MemoryError, which the editor and jobs expect
+        return np.zeros(count, dtype=np.float32)
     # a system without huge pages refuses; small pages do as well
     with suppress(OSError):
         block.madvise(system.MADV_HUGEPAGE)
