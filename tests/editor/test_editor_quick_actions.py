@@ -121,10 +121,12 @@ def test_two_numbers_typed_before_the_first_answer_both_count(tab):
     tab.page.fill("input[name=light_y]", "-1.25")
     tab.page.press("input[name=light_y]", "Enter")
     tab.until("flarewright.state.lights[0].field_deg.join() === '3.5,-1.25'")
-    # a key that is moved behind another one is the same key
-    for name, value in (("seconds", "4.5"), ("right", "7"), ("up", "2.5")):
-        tab.page.fill(f"input[name=key_{name}_0]", value)
-    tab.page.press("input[name=key_up_0]", "Enter")
+    # a key that is moved behind another one is the same key, whenever the answer moves its row
+    tab.page.fill("input[name=key_seconds_0]", "4.5")
+    for value in ("7", "2.5"):
+        tab.page.keyboard.press("Tab")
+        tab.page.keyboard.type(value)
+    tab.page.keyboard.press("Enter")
     tab.until("flarewright.state.lights[0].keys.at(-1).field_deg.join() === '7,2.5'")
     keys = tab.state()["lights"][0]["keys"]
     assert [(key["at_s"], key["field_deg"]) for key in keys] == [(3.0, [-4.0, -2.0]), (4.5, [7.0, 2.5])]
@@ -134,6 +136,27 @@ def test_two_numbers_typed_before_the_first_answer_both_count(tab):
     tab.page.fill("input[name=light_height]", "5")
     tab.page.press("input[name=light_height]", "Enter")
     tab.until("flarewright.state.lights[0].shape.size_deg.join() === '2,5'")
+
+
+def test_the_focus_stays_with_a_key_that_moves_to_another_row(tab):
+    """It used to stay in the row, so that what was typed next went to another key."""
+    for at_s, place in ((0, [1, 2]), (3, [-4, -2]), (6, [5, 0])):
+        tab.js(f"flarewright.command('set_key', {{light: 0, at_s: {at_s}, field_deg: {place}}})")
+    tab.until("flarewright.state.lights[0].keys.length === 3")
+    tab.page.fill("input[name=key_seconds_0]", "4.5")
+    tab.page.keyboard.press("Tab")
+    tab.until("document.querySelector('[name=key_seconds_1]')?.value === '4.5'")
+    assert tab.js("document.activeElement.name") == "key_right_1"
+    tab.page.keyboard.type("7")
+    tab.page.keyboard.press("Enter")
+    tab.until("flarewright.state.lights[0].keys[1].field_deg.join() === '7,2'")
+    # a removed key is gone from the table while its button has the focus, and the next key can be removed
+    tab.page.click("[name=key_remove_0]")
+    tab.until("document.querySelectorAll('table.keys tbody tr').length === 2")
+    assert tab.js("document.activeElement.name") == "key_remove_0"
+    tab.page.keyboard.press("Enter")
+    tab.until("document.querySelectorAll('table.keys tbody tr').length === 1")
+    assert [key["at_s"] for key in tab.state()["lights"][0]["keys"]] == [6.0]
 
 
 def test_a_light_added_while_a_path_plays_is_no_error_of_the_page(tab):

@@ -6,6 +6,9 @@ const HALF_STEP_S = 0.0051;
 // the latest time of a key
 const LAST_S = 86400;
 
+// The number of the key that has the first possible of some times.
+const numberAt = (times, keys) => times.map((at_s) => keys.findIndex((key) => Math.abs(key.at_s - at_s) < HALF_STEP_S)).find((one) => one >= 0);
+
 export function pathGroup(app) {
   const { player } = app;
   const span = () => Math.max(5, Math.ceil(app.state?.path_s ?? 0), Math.ceil(player.at));
@@ -34,6 +37,8 @@ export function pathGroup(app) {
   });
   box.addEventListener('keydown', (event) => { if (event.key === 'Enter') box.blur(); });
   let drawn = '';
+  // the light and the times of the key of a row
+  const keyOf = new WeakMap();
 
   function mark(each, k) {
     const place = `calc(8px + (100% - 16px) * ${each.at_s / span()})`;
@@ -75,15 +80,27 @@ export function pathGroup(app) {
     const times = [each.at_s];
     const change = (name, valuesOf) => app.command(name, () => {
       const now = app.state.lights[light]?.keys ?? [];
-      const number = times.map((at_s) => now.findIndex((key) => Math.abs(key.at_s - at_s) < HALF_STEP_S)).find((one) => one >= 0);
+      const number = numberAt(times, now);
       return number === undefined ? null : { light, ...valuesOf(now[number], number) };
     });
     const move = (at_s) => change('move_key', (_, number) => { times.push(at_s); return { number, at_s }; });
     const place = (axis, angle) => change('set_key', (key) => ({ at_s: key.at_s, field_deg: key.field_deg.with(axis, angle) }));
     const remove = () => change('remove_key', (_, number) => ({ number })).catch(() => {});
-    return h('tr', {}, cell(each.at_s, 'seconds', move),
+    const element = h('tr', {}, cell(each.at_s, 'seconds', move),
       cell(each.field_deg[0], 'right', (value) => place(0, value)), cell(each.field_deg[1], 'up', (value) => place(1, value)),
-      h('td', {}, button('×', remove, { kind: 'quiet', 'aria-label': `Remove key ${k + 1}` })));
+      h('td', {}, button('×', remove, { kind: 'quiet', 'aria-label': `Remove key ${k + 1}`, name: `key_remove_${k}` })));
+    keyOf.set(element, { light, times });
+    return element;
+  }
+  // Focus the same field of the same key again, which may be in another row; without the key, that of the same row.
+  // What was selected, as by the Tab key, is selected again: typing replaces it.
+  function focusAgain(field) {
+    const [, name, row] = field.name.match(/^(\w+)_(\d+)$/);
+    const { light, times } = keyOf.get(field.closest('tr'));
+    const number = (light === app.light ? numberAt(times, keys()) : undefined) ?? Math.min(Number(row), keys().length - 1);
+    const again = body.querySelector(`[name=${name}_${number}]`);
+    again?.focus();
+    if (field.selectionEnd > field.selectionStart) again?.select();
   }
   function tick() {
     play.textContent = player.playing ? '■ Stop' : '▶ Play';
@@ -110,11 +127,11 @@ export function pathGroup(app) {
       if (now === drawn) return;
       const active = body.contains(document.activeElement) ? document.activeElement : null;
       // keep a field while the user types in it
-      if (active && active.value !== active.defaultValue) return;
+      if (active?.matches('input') && active.value !== active.defaultValue) return;
       drawn = now;
       marks.replaceChildren(...mine.map(mark));
       body.replaceChildren(...mine.map(line));
-      if (active) body.querySelector(`[name=${active.name}]`)?.focus();
+      if (active) focusAgain(active);
     },
   };
 }
