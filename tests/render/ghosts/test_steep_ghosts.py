@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flarewright.kernels.tracing.sequential import ALIVE, REL, STOP_X
 from flarewright.model import Camera, Light, Lines, Project, Quality
 from flarewright.optics.lens.paths import ghost_paths
-from flarewright.optics.rays.bundle import Bundle, Refinement, trace_bundle, trace_grid
+from flarewright.optics.rays.bundle import Bundle, Refinement, trace_bundle, trace_grid, trace_points
 from flarewright.optics.rays.path_reflectance import CURVE_NM
+from flarewright.optics.rays.pupil_region import find_region, front_box, region_at_ends
 from flarewright.render.ghosts import steep_ghosts
 from flarewright.render.ghosts.final_pass import FinalPass
 from flarewright.render.ghosts.matrix_flux import matrix_fluxes
@@ -91,6 +93,46 @@ def test_few_traced_wavelengths_give_the_colours_of_all(monkeypatch, lens, f_num
     plain = np.ones(len(CURVE_NM)) @ seen_light(shot)
     assert np.abs(few - every).max() < 0.005 * np.abs(every).max()
     assert np.abs(plain - every).max() > 0.02 * np.abs(every).max()
+
+
+@pytest.mark.parametrize(
+    ("lens", "f_number", "field"), [("takumar-50-f1.4", 4.0, (-9.0, 5.0)), ("canon-70-200", 5.6, (4.0, 3.0))]
+)
+def test_light_at_the_ends_of_the_spectrum_is_found_around_that_between(lens, f_number, field):
+    """Every ray of a dense grid over the front that passes at an end lies in it, and many outside the known part."""
+    project = Project(
+        lens=lens, f_number=f_number, lights=(Light(field_deg=field),), quality=Quality(mode="final", wavelengths=3)
+    )
+    settled = resolve_project(project)
+    (shot,) = make_shots(settled, make_opening(settled, None))
+    fine, tilt, radius = at_fine_wavelengths(shot).packed, shot.incidence.tilt, shot.opening.radius
+    box = front_box(fine, tilt)
+    x, y = np.meshgrid(np.linspace(*box[:2], 100), np.linspace(*box[2:], 200), indexing="ij")
+    pupil = np.stack([x, y], axis=2).reshape(-1, 2)
+    searched, found, outside = 0, 0, {"known": 0, "found": 0}
+    for path in ghost_paths(settled.lens)[::3]:
+        search = (path, tilt, radius, shot.view_radius)
+        if (known := find_region(shot.packed, *search)) is None:
+            continue
+        searched += 1
+        _, right, low, high = known.box
+        # light goes on beyond a part that is far too small
+        part = replace(known, box=np.array([0.0, right, low, low + 0.4 * (high - low)]))
+        assert region_at_ends(fine, *search, part) is None
+        # the known part has some room at its sides
+        part = replace(known, box=np.array([0.0, 0.9 * right, 0.9 * low + 0.1 * high, 0.1 * low + 0.9 * high]))
+        if (region := region_at_ends(fine, *search, part)) is None:
+            continue
+        found += 1
+        for w in (0, len(FINE_NM) - 1):
+            rays = trace_points(fine, w, path, tilt, pupil)
+            passing = (rays[:, ALIVE] > 0.0) & (rays[:, REL] <= 1.0)
+            for crossing in range(path.stop_crossings):
+                passing &= np.hypot(*rays[:, STOP_X + 2 * crossing :][:, :2].T) <= radius
+            for name, own in (("known", part.box), ("found", region.box)):
+                outside[name] += int(((pupil < own[0::2]) | (pupil > own[1::2])).any(axis=1)[passing].sum())
+    assert found > 0.8 * searched > 0
+    assert outside["known"] > outside["found"] == 0
 
 
 def test_lines_are_all_traced(monkeypatch):

@@ -273,6 +273,36 @@ def find_region(
     return _region(roomy, sums, slivers)
 
 
+def region_at_ends(
+    packed: PackedLens, path: LightPath, tilt: float, iris_radius: float, view_radius: float, known: Region
+) -> Region | None:
+    """Find the part of the pupil that a path accepts at more wavelengths, if it lies around a known part.
+
+    Parameters
+    ----------
+    packed : PackedLens
+        At more wavelengths.
+    path, tilt, iris_radius, view_radius
+        As in `find_region`.
+    known : Region
+        What the path accepts at some wavelengths between those of `packed`.
+
+    Returns
+    -------
+    Region or None
+        With `known` and what passes at both ends of the wavelengths; None where it does not lie around `known`.
+    """
+    front = front_box(packed, tilt)
+    around, finest, box = widened_box(known.box, front, NEAR), _finest(packed, front), known.box
+    for w in wavelengths_fitted(packed)[1:]:
+        arguments = (*_looking_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
+        found, sums, _ = _scan(packed, arguments, around, cells_across(packed, FINER), finest, slivers=known.slivers)
+        if sums[4] < BLOB or ((found == around) & (around != front)).any():
+            return None
+        box = join_boxes(box, found)
+    return replace(known, box=box, share=known.share * _area(known.box) / _area(box))
+
+
 def _looked_at(packed: PackedLens, front: Floats, within: Floats | None, quick: bool) -> tuple[Floats, tuple[int, int]]:
     """Return the area of the first scan, and its cells."""
     box, cells = front, cells_across(packed, PREPASS_QUICK if quick else PREPASS)

@@ -25,7 +25,7 @@ from ...optics.lens.paths import LightPath
 from ...optics.pupil.polygon import mapped, points
 from ...optics.rays.bundle import Bundle, Refinement, trace_bundle, trace_grid
 from ...optics.rays.path_reflectance import PathSpectrum
-from ...optics.rays.pupil_region import Region, find_region, measure_region, widened_region
+from ...optics.rays.pupil_region import Region, find_region, measure_region, region_at_ends, widened_region
 from ...optics.rays.torn_cells import cut_failed_triangles
 from ...optics.scattering.sensor_grating import GratingOrder, grating_orders
 from ...typing import Floats
@@ -210,7 +210,7 @@ def draw_final(
     spectrum = traced_spectrum(shot, path, bundle, item.in_picture)
     steep = "not" if few else steepness(shot, bundle, spectrum, item.in_picture)
     if steep != "not":
-        other = _seen_by(at_fine_wavelengths(shot), item)
+        other = _seen_by(at_fine_wavelengths(shot), item, anew=steep == "much")
         if steep == "much":
             watch.lap("colour")
             draw_final(replace(other, least_steps=2), quality, canvas, visibility, stop, around, detail, costs)
@@ -287,9 +287,10 @@ def _draw_in_all(
             watch.drew(whole, data, shot.incidence.axes, place, canvas.size(detail))
 
 
-def _seen_by(shot: Shot, item: FinalPass) -> FinalPass:
-    """Search the accepted pupil of an item again, at the wavelengths of another shot."""
-    found = find_region(shot.packed, item.path, shot.incidence.tilt, shot.opening.radius, item.view_radius)
+def _seen_by(shot: Shot, item: FinalPass, *, anew: bool) -> FinalPass:
+    """Search the accepted pupil of an item at the wavelengths of another shot; not `anew`: around the known one."""
+    search = (shot.packed, item.path, shot.incidence.tilt, shot.opening.radius, item.view_radius)
+    found = (None if anew else region_at_ends(*search, item.region)) or find_region(*search)
     orders = item.orders
     if orders and shot.grating is not None and item.path.second_reflection is not None:
         orders = grating_orders(shot.packed, item.path.second_reflection, shot.grating)
