@@ -21,6 +21,7 @@ from flarewright.render.ghosts.steep_ghosts import (
     bent_spectrum,
     ends,
     gaps_at_ends,
+    interpolated_where_straight,
     light_up_to_its_end,
     within_gaps,
 )
@@ -77,7 +78,7 @@ def test_interpolated_rays_pass_where_traced_ones_do(name):
         ("takumar-50-f1.4", 4.0, (-9.0, 5.0), "13-0"),
     ],
 )
-def test_few_traced_wavelengths_give_the_colours_of_all(monkeypatch, lens, f_number, field, name):
+def test_few_traced_and_drawn_wavelengths_give_the_colours_of_all(monkeypatch, lens, f_number, field, name):
     project = Project(
         lens=lens, f_number=f_number, lights=(Light(field_deg=field),), camera=Camera(size_px=(640, 360)),
         quality=Quality(mode="final", wavelengths=3),
@@ -89,6 +90,7 @@ def test_few_traced_wavelengths_give_the_colours_of_all(monkeypatch, lens, f_num
 
     few = color()
     monkeypatch.setattr(steep_ghosts, "RAY_STRIDE", 1)
+    monkeypatch.setattr(steep_ghosts, "BEND", -1.0)
     every = color()
     plain = np.ones(len(CURVE_NM)) @ seen_light(shot)
     assert np.abs(few - every).max() < 0.005 * np.abs(every).max()
@@ -133,6 +135,31 @@ def test_light_at_the_ends_of_the_spectrum_is_found_around_that_between(lens, f_
                 outside[name] += int(((pupil < own[0::2]) | (pupil > own[1::2])).any(axis=1)[passing].sum())
     assert found > 0.8 * searched > 0
     assert outside["known"] > outside["found"] == 0
+
+
+def test_a_curve_is_computed_where_it_bends():
+    """Light that begins like a square root, and a smooth curve: both within the told part of the largest value."""
+    asked: list[int] = []
+
+    def begun(w: int) -> float:
+        asked.append(w)
+        return float(np.sqrt(max(FINE_NM[w] - 500.0, 0.0)))
+
+    found = interpolated_where_straight(FINE_NM, begun, 5e-3)
+    exact = np.sqrt(np.maximum(FINE_NM - 500.0, 0.0))
+    assert np.abs(found - exact).max() < 5e-3 * exact.max()
+    # every other, and those beside the beginning
+    assert set(asked) >= {*range(0, 22, 2), 21, 9, 11}
+    assert len(asked) == len({*asked}) < 17
+    asked.clear()
+    # not even those
+    sine = interpolated_where_straight(FINE_NM, lambda w: asked.append(w) or 1.0 + np.sin(FINE_NM[w] / 80.0), 5e-2)
+    assert sorted(asked) == [*range(0, 22, 2), 21]
+    # the remainder of a cubic, largest at 720 nm between 630, 690, 755 and 800 nm
+    assert np.abs(sine - 1.0 - np.sin(FINE_NM / 80.0)).max() < 90.0 * 30.0 * 35.0 * 80.0 / 24.0 / 80.0**4
+    asked.clear()
+    assert (interpolated_where_straight(FINE_NM, begun, -1.0) == exact).all()
+    assert asked == [*range(22)]
 
 
 def test_lines_are_all_traced(monkeypatch):

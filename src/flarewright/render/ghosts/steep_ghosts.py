@@ -8,7 +8,7 @@ are ghosts whose throughput at the traced wavelengths and at the ends of the spe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache, lru_cache
 from typing import Literal
 
@@ -45,9 +45,10 @@ ABRUPT_PART = 0.1
 # light begins between two wavelengths if one has less than this part of the other's throughput, and matters if the gap
 # has this share of the ghost's colour
 BEGIN_PART, BEGIN_SHARE = 0.05, 0.05
-# a ghost's flux is measured with rays traced at every fourth fine wavelength, and interpolated between these: against
-# rays traced at all, the colours of 47 steep ghosts of seven lenses differ by at most 0.3 %
-RAY_STRIDE = 4
+# a ghost's flux is measured with rays traced at every fourth fine wavelength and at the ends, and interpolated between
+# these; where it bends by less than a part of the largest flux between every other fine wavelength, it is interpolated:
+# against rays traced and drawn at all, the colours of 59 steep ghosts of nine lenses differ by at most 0.3 %
+RAY_STRIDE, BEND = 4, 5e-3
 # size of the pictures by which a ghost's flux is measured
 SMALL_PX = (64, 36)
 # drafts do not correct ghosts fainter than this, relative to the largest channel of the brightest
@@ -147,7 +148,7 @@ def bent_spectrum(
         For `Shot.weights`.
     """
     # use one grid for both, so that its errors cancel
-    found, known = np.split(_fluxes(shot, fine, bundle, to_pixels), [len(fine.packed.wavelengths_nm)])
+    found, known = _fluxes(shot, fine, bundle, to_pixels)
     assert shot.between is not None
     traced_nm = shot.packed.wavelengths_nm
     if spectrum is None:
@@ -160,15 +161,17 @@ def bent_spectrum(
     return PathSpectrum(spectrum.passed * ratios[0], spectrum.carried)
 
 
-def _fluxes(shot: Shot, fine: Shot, bundle: Bundle, to_pixels: Floats) -> Floats:
-    """Return the light in the picture if all rays carry 1, mm^2, at the wavelengths of `fine`, then at those of `shot`.
+def _fluxes(shot: Shot, fine: Shot, bundle: Bundle, to_pixels: Floats) -> tuple[Floats, Floats]:
+    """Return the light in the picture if all rays carry 1, mm^2, at the wavelengths of `fine` and at those of `shot`.
 
     The bundle is drawn, small: a sum of nodes that pass would jump by 8 % from wavelength to wavelength where a ghost
     covers few cells.
     """
+    assert shot.between is not None
     place = to_pixels * np.tile(np.array(SMALL_PX) / shot.size_px, 2)
-    found = np.empty(len(fine.packed.wavelengths_nm) + len(shot.packed.wavelengths_nm))
-    for k, rays in enumerate(_rays(shot, fine, bundle)):
+    fine_rays, traced_rays = _rays(shot, fine, bundle)
+
+    def flux(rays: Floats) -> float:
         rays[:, WEIGHT] = 1.0
         whole, data = cut_failed_triangles(bundle, rays)
         canvas = blank(SMALL_PX)
@@ -177,19 +180,61 @@ def _fluxes(shot: Shot, fine: Shot, bundle: Bundle, to_pixels: Floats) -> Floats
             bundle.path.stop_crossings, shot.opening.blades, shot.opening.levels, shot.incidence.axes, place, 1.0,
             np.ones(3), canvas.plane(), whole.halves,
         )  # fmt: skip
-        found[k] = canvas.plane()[..., 0, :].sum(dtype=np.float64)
-    return found
+        return float(canvas.plane()[..., 0, :].sum(dtype=np.float64))
+
+    fine_nm, traced_nm = fine.packed.wavelengths_nm, shot.packed.wavelengths_nm
+    least_bend = BEND if shot.between.lines_nm is None else -1.0
+    found = interpolated_where_straight(fine_nm, lambda w: flux(fine_rays(w)), least_bend)
+    return found, np.array([flux(traced_rays(w)) for w in range(len(traced_nm))])
 
 
-def _rays(shot: Shot, fine: Shot, bundle: Bundle) -> Iterator[Floats]:
-    """Return copies of a bundle's rays at each wavelength of `fine`, then of `shot`; few of them are traced.
+def interpolated_where_straight(wavelengths_nm: Floats, at: Callable[[int], float], bend: float = BEND) -> Floats:
+    """Compute a curve at every other wavelength, and at those between only where it bends.
+
+    Parameters
+    ----------
+    wavelengths_nm : ndarray, shape (M,)
+        Rising.
+    at : callable
+        The value at one of them, at least 0.
+    bend : float
+        Where the cubic through the nearest four values is this close to the line through two, relative to the largest
+        value, it stands for the value. Negative: compute all.
+
+    Returns
+    -------
+    ndarray, shape (M,)
+
+    Examples
+    --------
+    >>> interpolated_where_straight(np.arange(7.0), lambda w: max(w - 3.0, 0.0)).tolist()
+    [0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0]
+    """
+    count = len(wavelengths_nm)
+    known = np.union1d(np.arange(0, count, 2), [count - 1]) if bend >= 0.0 and count > 3 else np.arange(count)
+    values = np.empty(count)
+    values[known] = [at(w) for w in known.tolist()]
+    limit = bend * values[known].max()
+    for w in np.setdiff1d(np.arange(count), known).tolist():
+        near = known[np.argsort(np.abs(known - w), kind="stable")[:4]]
+        line, cubic = (
+            float(lagrange(tuple(wavelengths_nm[nodes]), (wavelengths_nm[w],))[0] @ values[nodes])
+            for nodes in (near[:2], near)
+        )
+        values[w] = cubic if abs(cubic - line) <= limit else at(w)
+    return values
+
+
+def _rays(shot: Shot, fine: Shot, bundle: Bundle) -> tuple[Callable[[int], Floats], Callable[[int], Floats]]:
+    """Return functions that copy a bundle's rays at a wavelength of `fine`, and of `shot`; few of them are traced.
 
     Rays at the others are polynomials in 1 / wavelength^2 through the nearest three, as in `areas_between`, unless a
     ray ends in the lens at one of the three only. Lines may be far apart: they are all traced.
     """
     assert shot.between is not None
     fine_nm, tilt, is_lines = fine.packed.wavelengths_nm, shot.incidence.tilt, shot.between.lines_nm is not None
-    few = np.unique(np.append(np.arange(0, len(fine_nm), RAY_STRIDE), len(fine_nm) - 1))
+    # the last gap takes in what is left
+    few = np.unique(np.append(np.arange(0, len(fine_nm) - RAY_STRIDE, RAY_STRIDE), len(fine_nm) - 1))
 
     @cache
     def traced(w: int) -> Floats:
@@ -206,12 +251,15 @@ def _rays(shot: Shot, fine: Shot, bundle: Bundle) -> Iterator[Floats]:
         rays: Floats = of_a * a + of_b * b + of_c * c
         return rays
 
-    for w, wavelength_nm in enumerate(fine_nm):
-        data = None if is_lines or w in few else between(wavelength_nm)
-        yield traced(w).copy() if data is None else data
-    for w, wavelength_nm in enumerate(shot.packed.wavelengths_nm):
-        data = None if is_lines else between(wavelength_nm)
-        yield trace_points(shot.packed, w, bundle.path, tilt, bundle.pupil) if data is None else data
+    def at_fine(w: int) -> Floats:
+        data = None if is_lines or w in few else between(fine_nm[w])
+        return traced(w).copy() if data is None else data
+
+    def at_traced(w: int) -> Floats:
+        data = None if is_lines else between(shot.packed.wavelengths_nm[w])
+        return trace_points(shot.packed, w, bundle.path, tilt, bundle.pupil) if data is None else data
+
+    return at_fine, at_traced
 
 
 def steep_paths(
