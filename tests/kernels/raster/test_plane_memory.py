@@ -1,11 +1,18 @@
 """Memory of planes: black, writable, and each plane's alone, in huge pages or not."""
 
 import mmap
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
-from flarewright.kernels.raster.plane_memory import black_memory, black_picture
+from flarewright.kernels.raster.plane_memory import (
+    _KEPT,
+    black_differences,
+    black_memory,
+    black_picture,
+    unset_picture,
+)
 
 
 @pytest.mark.parametrize("count", [0, 1000, 2**21 + 5])
@@ -33,6 +40,50 @@ def test_a_picture_has_rows_of_pixels(size_px):
     assert picture.flags.c_contiguous
     assert picture.flags.writeable
     assert not picture.any()
+
+
+def test_a_picture_of_differences_is_black_and_in_double_precision():
+    differences = black_differences(1280, 720)
+    assert differences.shape == (720, 1280, 3)
+    assert differences.dtype == np.float64
+    assert not differences.any()
+    differences[-1, -1] = 1.0
+    assert differences.sum() == 3.0
+
+
+def test_memory_of_a_plane_that_is_gone_serves_another_that_is_black():
+    if not hasattr(mmap, "MADV_HUGEPAGE"):
+        pytest.skip("planes lie in the memory of the C library on this system")
+    first = black_picture(1280, 720)
+    first += 1.0
+    place, part = first.ctypes.data, first[3:5]
+    # not while a part of it is in use
+    del first
+    second = black_picture(1280, 720)
+    assert second.ctypes.data != place
+    assert (part == 1.0).all()
+    del part
+    third = black_picture(1280, 720)
+    assert third.ctypes.data == place
+    assert not third.any()
+    assert not second.any()
+    third += 2.0
+    del third
+    assert unset_picture(1280, 720).ctypes.data == place
+    # of another size
+    assert black_picture(1280, 1000).ctypes.data != place
+
+
+def test_threads_get_memory_of_their_own():
+    def work(number):
+        for _ in range(50):
+            plane = black_memory(2**20 + 2**19)
+            assert not plane.any()
+            plane += number
+            assert (plane == number).all()
+
+    with ThreadPoolExecutor(2 * _KEPT) as pool:
+        list(pool.map(work, range(1, 2 * _KEPT + 1)))
 
 
 def test_a_system_that_refuses_huge_pages_gives_small_ones(monkeypatch):

@@ -2,12 +2,15 @@
 
 Rows of a plane lie kilobytes apart, so with pages of 4 kB a triangle touches another page in each of its rows. And what
 the system maps for one plane returns to it when the plane is gone, while the C library may keep it: a tenth of the peak
-of a large frame.
+of a large frame. A few smaller planes are kept for the next frame: a draft takes a few times as long as the system
+takes to clear new pages for it.
 """
 
 from __future__ import annotations
 
 import mmap
+import weakref
+from collections import deque
 from contextlib import suppress
 from typing import Any
 
@@ -18,6 +21,12 @@ from numpy.typing import NDArray
 _LEAST_BYTES = 4 * 2**20
 # size of a huge page; where it is larger, planes just lie in small pages
 _HUGE_BYTES = 2 * 2**20
+# up to this size, and this number of them, the memory of planes that are gone is kept: as for two drafts of 1280 x 720
+# pixels, in double precision
+_KEPT_BYTES, _KEPT = 24 * 2**20, 5
+
+# appending to it and popping from it are atomic, and the oldest is dropped
+_kept: deque[Any] = deque(maxlen=_KEPT)
 
 
 def black_memory(count: int) -> NDArray[np.float32]:
@@ -37,24 +46,10 @@ def black_memory(count: int) -> NDArray[np.float32]:
     MemoryError
         There is not so much memory.
     """
-    # typed as Any: only some systems have these names
-    system: Any = mmap
-    if 4 * count < _LEAST_BYTES or not hasattr(system, "MADV_HUGEPAGE"):
-        return np.zeros(count, dtype=np.float32)
-    # whole huge pages, and space to begin at one: each end would else lie in hundreds of small pages, which cost more
-    # than all the huge ones together. What is never written takes no memory
-    size = -(-4 * count // _HUGE_BYTES) * _HUGE_BYTES
-    try:
-        block = system.mmap(-1, size + _HUGE_BYTES, flags=system.MAP_PRIVATE | system.MAP_ANONYMOUS)
-    except OSError:
-        # the C library may hold enough that was freed; else this raises MemoryError, which the editor and jobs expect
-        return np.zeros(count, dtype=np.float32)
-    # a system without huge pages refuses; small pages do as well
-    with suppress(OSError):
-        block.madvise(system.MADV_HUGEPAGE)
-    floats: NDArray[np.float32] = np.frombuffer(block, dtype=np.float32)
-    start = -floats.ctypes.data % _HUGE_BYTES // floats.itemsize
-    return floats[start : start + count]
+    floats, is_black = _memory(count)
+    if not is_black:
+        floats.fill(0.0)
+    return floats
 
 
 def black_picture(width: int, height: int) -> NDArray[np.float32]:
@@ -70,3 +65,65 @@ def black_picture(width: int, height: int) -> NDArray[np.float32]:
     ndarray of float32, shape (height, width, 3)
     """
     return black_memory(3 * width * height).reshape(height, width, 3)
+
+
+def unset_picture(width: int, height: int) -> NDArray[np.float32]:
+    """Return a picture in such memory whose values are not set, as from `numpy.empty`; arguments as `black_picture`."""
+    return _memory(3 * width * height)[0].reshape(height, width, 3)
+
+
+def black_differences(width: int, height: int) -> NDArray[np.float64]:
+    """Return zeros for a picture of row differences (`polygons.sum_rows`), in memory from `black_memory`.
+
+    Parameters
+    ----------
+    width, height : int
+        Number of columns and of rows.
+
+    Returns
+    -------
+    ndarray of float64, shape (height, width, 3)
+    """
+    return black_memory(6 * width * height).view(np.float64).reshape(height, width, 3)
+
+
+def _memory(count: int) -> tuple[NDArray[np.float32], bool]:
+    """Return floats, and whether they are all 0."""
+    # typed as Any: only some systems have these names
+    system: Any = mmap
+    if 4 * count < _LEAST_BYTES or not hasattr(system, "MADV_HUGEPAGE"):
+        return np.zeros(count, dtype=np.float32), True
+    # whole huge pages, and space to begin at one: each end would else lie in hundreds of small pages, which cost more
+    # than all the huge ones together. What is never written takes no memory
+    size = (-(-4 * count // _HUGE_BYTES) + 1) * _HUGE_BYTES
+    block = _taken(size)
+    is_black = block is None
+    if block is None:
+        try:
+            block = system.mmap(-1, size, flags=system.MAP_PRIVATE | system.MAP_ANONYMOUS)
+        except OSError:
+            # the C library may hold enough that was freed; else this raises MemoryError, which the editor and jobs
+            # expect
+            return np.zeros(count, dtype=np.float32), True
+        # a system without huge pages refuses; small pages do as well
+        with suppress(OSError):
+            block.madvise(system.MADV_HUGEPAGE)
+    floats: NDArray[np.float32] = np.frombuffer(block, dtype=np.float32)
+    if size <= _KEPT_BYTES + _HUGE_BYTES:
+        # all views of the plane hold this array
+        weakref.finalize(floats, _kept.append, block).atexit = False
+    start = -floats.ctypes.data % _HUGE_BYTES // floats.itemsize
+    return floats[start : start + count], is_black
+
+
+def _taken(size: int) -> Any | None:
+    """Take a block of a size from those that are kept."""
+    for _ in range(_KEPT):
+        try:
+            block = _kept.pop()
+        except IndexError:
+            return None
+        if len(block) == size:
+            return block
+        _kept.appendleft(block)
+    return None

@@ -16,6 +16,7 @@ from ...kernels.tracing.sequential import REFLECT, REFRACT
 from ...optics.colour.spectrum import hats
 from ...optics.lens.paths import LightPath
 from ...optics.rays.path_reflectance import CURVE_NM, BandCurves, PathSpectrum, joined_steps, products_between
+from ...optics.rays.steepness import curve_hats
 from ...typing import Floats, Indices, Mask
 from ..scene.shot import Shot, at_fine_wavelengths
 from .matrix_flux import ENTRANCE_SIDES, matrix_fluxes
@@ -88,7 +89,7 @@ def draft_colors(shot: Shot, paths: Sequence[LightPath]) -> Floats:
         else:
             own = None if spectra is None else PathSpectrum(spectra.passed[chosen], spectra.carried[chosen])
             nm, steep = _merged((known_nm, known[chosen]), (fine_nm[waves], steep))
-            traced, curve = throughput[chosen], steep @ hats(CURVE_NM, nm)
+            traced, curve = throughput[chosen], steep @ curve_hats(tuple(nm))
         colors[chosen] = bent_weights(shot, traced, own, curve)
     # flux under total reflection is rounding error
     light = beyond.max(axis=1)

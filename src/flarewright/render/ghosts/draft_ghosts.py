@@ -10,6 +10,7 @@ from itertools import pairwise, product
 import numpy as np
 
 from ...kernels.paraxial.ghosts import RIM
+from ...kernels.raster.plane_memory import black_differences, unset_picture
 from ...kernels.raster.polygons import sum_rows
 from ...optics.colour.rgb import luminance_weights
 from ...optics.lens.paths import LightPath
@@ -126,7 +127,7 @@ def _draw_alone(drawing: _Drawing, k: int) -> Patch | None:
         return None
     left, top, right, bottom = draft_window(drawing.points, path)
     # an empty window too has a pixel
-    marks = np.zeros((max(bottom - top, 1), max(right - left, 1), 3))
+    marks = black_differences(max(right - left, 1), max(bottom - top, 1))
     for shot, colors in zip(drawing.points, drawing.colors, strict=True):
         moved = replace(shot, to_pixels=shot.to_pixels - [left, 0.0, 0.0, 0.0])
         draw_draft(moved, [path], marks, colors[[place]], top)
@@ -139,7 +140,7 @@ def _marked_points(
     """Mark the ghosts of points, but those that are blurred or ramped, in one picture per resolution."""
     width, height = drawing.work.shots[0].size_px
     differences: list[Floats | None] = [None] * DETAILS
-    differences[0] = picture = np.zeros((height, width, 3))
+    differences[0] = picture = black_differences(width, height)
     mine = sorted(k for k in group if k in drawing.place)
     ghosts, places = [drawing.work.paths[k] for k in mine], [drawing.place[k] for k in mine]
     # ghosts with the same offset and no ramp, blur or scale are drawn together
@@ -208,7 +209,7 @@ def _mark_band(shot: Shot, paths: Sequence[LightPath], colors: Floats, picture: 
 
 
 def _summed(marks: Floats, in_bands: Callable[[int, Callable[[slice], None]], None]) -> Pixels:
-    pixels = np.empty(marks.shape, dtype=np.float32)
+    pixels = unset_picture(marks.shape[1], marks.shape[0])
     in_bands(len(marks), lambda band: sum_rows(marks[band], pixels[band]))
     return pixels
 

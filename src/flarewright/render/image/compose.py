@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import FlarewrightError
-from ...kernels.raster.plane_memory import black_picture
+from ...kernels.raster.plane_memory import black_picture, unset_picture
 from ...model.layer import Layer, part_inside
 
 
@@ -48,10 +48,12 @@ def beauty(layers: Sequence[Layer], size_px: tuple[int, int] | None = None) -> L
     width, height = size_px
     whole = (0, 0, width, height)
     rest = list(layers)
-    total = black_picture(width, height)
     if rest and rest[0].window == whole:
         # copying is faster than adding to zeros
+        total = unset_picture(width, height)
         total[:] = rest.pop(0).pixels
+    else:
+        total = black_picture(width, height)
     for layer in rest:
         add_layer(total, layer)
     return Layer("beauty", total, whole)
