@@ -294,9 +294,11 @@ def region_at_ends(
     """
     front = front_box(packed, tilt)
     around, finest, box = widened_box(known.box, front, NEAR), _finest(packed, front), known.box
+    # a number, for which the kernel is compiled
+    cells, slivers = cells_across(packed, FINER), int(known.slivers)
     for w in wavelengths_fitted(packed)[1:]:
         arguments = (*_looking_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
-        found, sums, _ = _scan(packed, arguments, around, cells_across(packed, FINER), finest, slivers=known.slivers)
+        found, sums, _ = _scan(packed, arguments, around, cells, finest, slivers=slivers)
         if sums[4] < BLOB or ((found == around) & (around != front)).any():
             return None
         box = join_boxes(box, found)
