@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from flarewright.kernels.raster import plane_memory
 from flarewright.kernels.raster.plane_memory import (
     _KEPT,
     black_differences,
@@ -51,33 +52,39 @@ def test_a_picture_of_differences_is_black_and_in_double_precision():
     assert differences.sum() == 3.0
 
 
-def test_memory_of_a_plane_that_is_gone_serves_another_that_is_black():
+def test_memory_of_a_draft_that_is_gone_serves_another_that_is_black():
     if not hasattr(mmap, "MADV_HUGEPAGE"):
         pytest.skip("planes lie in the memory of the C library on this system")
-    first = black_picture(1280, 720)
+    first = black_differences(1280, 720)
     first += 1.0
     place, part = first.ctypes.data, first[3:5]
     # not while a part of it is in use
     del first
-    second = black_picture(1280, 720)
+    second = black_differences(1280, 720)
     assert second.ctypes.data != place
     assert (part == 1.0).all()
     del part
-    third = black_picture(1280, 720)
+    third = black_differences(1280, 720)
     assert third.ctypes.data == place
     assert not third.any()
     assert not second.any()
     third += 2.0
     del third
-    assert unset_picture(1280, 720).ctypes.data == place
-    # of another size
-    assert black_picture(1280, 1000).ctypes.data != place
+    plane = black_memory(6 * 1280 * 720)
+    assert plane.ctypes.data == place
+    assert not plane.any()
+    # of another size, and too large to be kept
+    assert unset_picture(1280, 720).ctypes.data != place
+    held = len(plane_memory._kept)
+    large = unset_picture(1920, 1080)
+    del large
+    assert len(plane_memory._kept) == held
 
 
 def test_threads_get_memory_of_their_own():
     def work(number):
         for _ in range(50):
-            plane = black_memory(2**20 + 2**19)
+            plane = black_differences(1024, 512 + number % 2)
             assert not plane.any()
             plane += number
             assert (plane == number).all()

@@ -2,8 +2,8 @@
 
 Rows of a plane lie kilobytes apart, so with pages of 4 kB a triangle touches another page in each of its rows. And what
 the system maps for one plane returns to it when the plane is gone, while the C library may keep it: a tenth of the peak
-of a large frame. A few smaller planes are kept for the next frame: a draft takes a few times as long as the system
-takes to clear new pages for it.
+of a large frame. What drafts are drawn in is kept for the next one, as the system clears new pages for a third of their
+time.
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 _LEAST_BYTES = 4 * 2**20
 # size of a huge page; where it is larger, planes just lie in small pages
 _HUGE_BYTES = 2 * 2**20
-# up to this size, and this number of them, the memory of planes that are gone is kept: as for two drafts of 1280 x 720
-# pixels, in double precision
+# up to this size, and this number of them, memory is kept: for drafts of 1280 x 720 pixels in double precision
 _KEPT_BYTES, _KEPT = 24 * 2**20, 5
 
 # appending to it and popping from it are atomic, and the oldest is dropped
@@ -46,10 +45,7 @@ def black_memory(count: int) -> NDArray[np.float32]:
     MemoryError
         There is not so much memory.
     """
-    floats, is_black = _memory(count)
-    if not is_black:
-        floats.fill(0.0)
-    return floats
+    return _blackened(*_memory(count))
 
 
 def black_picture(width: int, height: int) -> NDArray[np.float32]:
@@ -68,12 +64,22 @@ def black_picture(width: int, height: int) -> NDArray[np.float32]:
 
 
 def unset_picture(width: int, height: int) -> NDArray[np.float32]:
-    """Return a picture in such memory whose values are not set, as from `numpy.empty`; arguments as `black_picture`."""
-    return _memory(3 * width * height)[0].reshape(height, width, 3)
+    """Return a picture whose values are not set, as from `numpy.empty`; its memory is kept when it is gone.
+
+    Parameters
+    ----------
+    width, height : int
+        Number of columns and of rows.
+
+    Returns
+    -------
+    ndarray of float32, shape (height, width, 3)
+    """
+    return _memory(3 * width * height, keep=True)[0].reshape(height, width, 3)
 
 
 def black_differences(width: int, height: int) -> NDArray[np.float64]:
-    """Return zeros for a picture of row differences (`polygons.sum_rows`), in memory from `black_memory`.
+    """Return zeros for a picture of row differences (`polygons.sum_rows`); their memory is kept when they are gone.
 
     Parameters
     ----------
@@ -84,11 +90,18 @@ def black_differences(width: int, height: int) -> NDArray[np.float64]:
     -------
     ndarray of float64, shape (height, width, 3)
     """
-    return black_memory(6 * width * height).view(np.float64).reshape(height, width, 3)
+    return _blackened(*_memory(6 * width * height, keep=True)).view(np.float64).reshape(height, width, 3)
 
 
-def _memory(count: int) -> tuple[NDArray[np.float32], bool]:
-    """Return floats, and whether they are all 0."""
+def _blackened(floats: NDArray[np.float32], is_black: bool) -> NDArray[np.float32]:
+    """Set floats to 0 unless they are."""
+    if not is_black:
+        floats.fill(0.0)
+    return floats
+
+
+def _memory(count: int, *, keep: bool = False) -> tuple[NDArray[np.float32], bool]:
+    """Return floats, whose memory is kept if it is not too large, and whether they are all 0."""
     # typed as Any: only some systems have these names
     system: Any = mmap
     if 4 * count < _LEAST_BYTES or not hasattr(system, "MADV_HUGEPAGE"):
@@ -109,7 +122,7 @@ def _memory(count: int) -> tuple[NDArray[np.float32], bool]:
         with suppress(OSError):
             block.madvise(system.MADV_HUGEPAGE)
     floats: NDArray[np.float32] = np.frombuffer(block, dtype=np.float32)
-    if size <= _KEPT_BYTES + _HUGE_BYTES:
+    if keep and size <= _KEPT_BYTES:
         # all views of the plane hold this array
         weakref.finalize(floats, _kept.append, block).atexit = False
     start = -floats.ctypes.data % _HUGE_BYTES // floats.itemsize
