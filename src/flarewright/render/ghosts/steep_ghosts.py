@@ -221,7 +221,7 @@ def interpolated_where_straight(wavelengths_nm: Floats, at: Callable[[int], floa
             float(lagrange(tuple(wavelengths_nm[nodes]), (wavelengths_nm[w],))[0] @ values[nodes])
             for nodes in (near[:2], near)
         )
-        values[w] = cubic if abs(cubic - line) <= limit else at(w)
+        values[w] = max(cubic, 0.0) if abs(cubic - line) <= limit else at(w)
     return values
 
 
