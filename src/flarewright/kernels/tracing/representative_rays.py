@@ -32,10 +32,25 @@ def lands_at(place, x, y):
 
 
 @borrowing
-def within_blades(rays, k, blades, axes):
-    """Return whether a ray crosses the stop within the blades, at every crossing; `axes` as in `clip.clip_triangle`."""
+def open_radius(blades):
+    """Return the radius of a circle around the axis that no blade cuts, less its rounding error; infinite without."""
+    least = np.inf
+    for b in range(blades.shape[0]):
+        # a blade is straight, or curved less than this circle
+        least = min(least, blades[b, 2])
+    return least * (1.0 - 1e-9)
+
+
+@borrowing
+def within_blades(rays, k, radius, blades, axes):
+    """Return whether a ray crosses the stop within the blades, at every crossing.
+
+    `radius` is `open_radius` of them; `axes` as in `clip.clip_triangle`.
+    """
     for column in range(STOP_X, rays.shape[1], 2):
         x, y = rays[k, column], rays[k, column + 1]
+        if x * x + y * y <= radius * radius:
+            continue
         u, v = x * axes[0, 0] + y * axes[1, 0], x * axes[0, 1] + y * axes[1, 1]
         for b in range(blades.shape[0]):
             if blade_value(blades, b, u, v) > 0.0:
@@ -66,22 +81,19 @@ def seen_rays(rays, iris_radius, blades, axes, place, width, height):
     -------
     ndarray, shape (N,), bool
     """
-    seen = np.empty(rays.shape[0], dtype=np.bool_)
-    _see(rays, iris_radius, blades, axes, place, width, height, seen)
+    seen, radius = np.empty(rays.shape[0], dtype=np.bool_), open_radius(blades)
+    for k in range(rays.shape[0]):
+        seen[k] = passes(rays, k, iris_radius) and _lands(rays, k, radius, blades, axes, place, width, height)
     return seen
 
 
 @borrowing
-def _see(rays, iris_radius, blades, axes, place, width, height, seen):
-    """Fill which rays pass and land in the picture; arguments as in `seen_rays`."""
-    everywhere = width == np.inf
-    for k in range(rays.shape[0]):
-        seen[k] = False
-        if not (passes(rays, k, iris_radius) and within_blades(rays, k, blades, axes)):
-            continue
-        x, y = rays[k, X], rays[k, Y]
-        column, row = lands_at(place, x, y)
-        seen[k] = everywhere or (0.0 <= column < width and 0.0 <= row < height)
+def _lands(rays, k, radius, blades, axes, place, width, height):
+    """Return whether a ray that passes all rims passes the blades and lands in the picture, as in `seen_rays`."""
+    if not within_blades(rays, k, radius, blades, axes):
+        return False
+    column, row = lands_at(place, rays[k, X], rays[k, Y])
+    return width == np.inf or (0.0 <= column < width and 0.0 <= row < height)
 
 
 @compiled
@@ -102,9 +114,12 @@ def choose_seen(rays, pupil, triangles, every, iris_radius, blades, axes, places
     ndarray, int64
         Nodes of the bundle, of either half; empty if no ray is seen.
     """
-    passing = np.empty((axes.shape[0], rays.shape[0]), dtype=np.bool_)
-    for half in range(axes.shape[0]):
-        _see(rays, iris_radius, blades, axes[half], places[half], width, height, passing[half])
+    passing, radius = np.empty((axes.shape[0], rays.shape[0]), dtype=np.bool_), open_radius(blades)
+    for k in range(rays.shape[0]):
+        # the same of both halves
+        alive = passes(rays, k, iris_radius)
+        for half in range(axes.shape[0]):
+            passing[half, k] = alive and _lands(rays, k, radius, blades, axes[half], places[half], width, height)
     chosen = _choose(pupil, triangles, every, passing, count)
     for k in range(chosen.size):
         chosen[k] %= rays.shape[0]
