@@ -62,3 +62,10 @@ def test_blades_pass_what_lies_on_their_open_side(iris):
     assert clear.sum() > 3900
     assert found.any()
     assert iris is None or (~found[:200]).sum() > 50 < found[:200].sum()
+
+
+def test_a_blade_over_the_axis_blocks_it():
+    rays = np.zeros((3, STOP_X + 2))
+    rays[:, ALIVE], rays[:, STOP_X] = 1.0, [0.0, 0.5, -0.5]
+    blades = np.array([[1.0, 0.0, -0.2, 0.0]])
+    assert seen_rays(rays, 4.0, blades, np.eye(2), np.zeros((2, 3)), np.inf, np.inf).tolist() == [False, False, True]

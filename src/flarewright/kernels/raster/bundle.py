@@ -14,6 +14,7 @@ from ..tracing.clip import (
     blade_value,
     clip_triangle,
     cut_to_rectangle,
+    inscribed_square,
     polygon_area,
     slope_over,
 )
@@ -351,10 +352,7 @@ def _plane_over_cell(spots, densities, triangles, start, end, mean, unit, drawn)
 @borrowing
 def _place_nodes(data, mirror, crossings, blades, axes, to_pixels, spots, blocked):
     """Fill the nodes' places in pixels and a bit set of the edges that block them; 0: none, -1: the ray ended."""
-    # most rays lie within the inscribed circle of the blades
-    inner2 = np.inf
-    for b in range(blades.shape[0]):
-        inner2 = min(inner2, blades[b, 2] * abs(blades[b, 2]))
+    inner2 = inscribed_square(blades)
     for k in range(data.shape[0]):
         x, y = mirror * data[k, X], data[k, Y]
         # the upright picture is the sensor turned by 180 degrees

@@ -50,6 +50,18 @@ def blade_value(blades, b, u, v):
 
 
 @borrowing
+def inscribed_square(blades):
+    """Return the squared radius of the circle around the axis that no blade cuts, within which most rays lie.
+
+    Infinite without blades, negative if one covers the axis. No blade is curved more than this circle.
+    """
+    least = np.inf
+    for b in range(blades.shape[0]):
+        least = min(least, blades[b, 2] * abs(blades[b, 2]))
+    return least
+
+
+@borrowing
 def cut_by_blades(polygon, count, crossings, blades, other, values):
     """Cut a polygon by every blade at every stop crossing; return its number of vertices, 0 if nothing passes."""
     for c in range(crossings):

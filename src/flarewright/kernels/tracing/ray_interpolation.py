@@ -3,7 +3,8 @@
 import numpy as np
 
 from ..jit.decorators import borrowing, compiled
-from .representative_rays import lands_at, open_radius, passes, within_blades
+from .clip import inscribed_square
+from .representative_rays import lands_at, passes, within_blades
 from .sequential import ALIVE, REL, WEIGHT, X, Y
 
 # rounding error of a sum of weights that is 1
@@ -75,7 +76,7 @@ def visible_areas(traced, shares, nearest, pupil, triangles, iris_radius, blades
         own[a] += third
         own[b] += third
         own[c] += third
-    ray, radius = np.empty((1, traced.shape[2])), open_radius(blades)
+    ray, inner2 = np.empty((1, traced.shape[2])), inscribed_square(blades)
     for m in range(shares.shape[0]):
         near = nearest[m]
         exact = shares[m, near] == 1.0
@@ -97,7 +98,7 @@ def visible_areas(traced, shares, nearest, pupil, triangles, iris_radius, blades
             if not passes(ray, 0, iris_radius):
                 continue
             for half in range(axes.shape[0]):
-                if within_blades(ray, 0, radius, blades, axes[half]):
+                if within_blades(ray, 0, inner2, blades, axes[half]):
                     column, row = lands_at(places[half], ray[0, X], ray[0, Y])
                     if 0.0 <= column < width and 0.0 <= row < height:
                         areas[m] += own[k]

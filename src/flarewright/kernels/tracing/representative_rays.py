@@ -5,7 +5,7 @@ from math import sqrt
 import numpy as np
 
 from ..jit.decorators import borrowing, compiled, inner
-from .clip import blade_value
+from .clip import blade_value, inscribed_square
 from .sequential import ALIVE, REL, STOP_X, X, Y
 
 
@@ -32,24 +32,14 @@ def lands_at(place, x, y):
 
 
 @borrowing
-def open_radius(blades):
-    """Return the radius of a circle around the axis that no blade cuts, less its rounding error; infinite without."""
-    least = np.inf
-    for b in range(blades.shape[0]):
-        # a blade is straight, or curved less than this circle
-        least = min(least, blades[b, 2])
-    return least * (1.0 - 1e-9)
-
-
-@borrowing
-def within_blades(rays, k, radius, blades, axes):
+def within_blades(rays, k, inner2, blades, axes):
     """Return whether a ray crosses the stop within the blades, at every crossing.
 
-    `radius` is `open_radius` of them; `axes` as in `clip.clip_triangle`.
+    `inner2` is `clip.inscribed_square` of them; `axes` as in `clip.clip_triangle`.
     """
     for column in range(STOP_X, rays.shape[1], 2):
         x, y = rays[k, column], rays[k, column + 1]
-        if x * x + y * y <= radius * radius:
+        if x * x + y * y < inner2:
             continue
         u, v = x * axes[0, 0] + y * axes[1, 0], x * axes[0, 1] + y * axes[1, 1]
         for b in range(blades.shape[0]):
@@ -81,16 +71,16 @@ def seen_rays(rays, iris_radius, blades, axes, place, width, height):
     -------
     ndarray, shape (N,), bool
     """
-    seen, radius = np.empty(rays.shape[0], dtype=np.bool_), open_radius(blades)
+    seen, inner2 = np.empty(rays.shape[0], dtype=np.bool_), inscribed_square(blades)
     for k in range(rays.shape[0]):
-        seen[k] = passes(rays, k, iris_radius) and _lands(rays, k, radius, blades, axes, place, width, height)
+        seen[k] = passes(rays, k, iris_radius) and _lands(rays, k, inner2, blades, axes, place, width, height)
     return seen
 
 
 @borrowing
-def _lands(rays, k, radius, blades, axes, place, width, height):
+def _lands(rays, k, inner2, blades, axes, place, width, height):
     """Return whether a ray that passes all rims passes the blades and lands in the picture, as in `seen_rays`."""
-    if not within_blades(rays, k, radius, blades, axes):
+    if not within_blades(rays, k, inner2, blades, axes):
         return False
     column, row = lands_at(place, rays[k, X], rays[k, Y])
     return width == np.inf or (0.0 <= column < width and 0.0 <= row < height)
@@ -114,12 +104,12 @@ def choose_seen(rays, pupil, triangles, every, iris_radius, blades, axes, places
     ndarray, int64
         Nodes of the bundle, of either half; empty if no ray is seen.
     """
-    passing, radius = np.empty((axes.shape[0], rays.shape[0]), dtype=np.bool_), open_radius(blades)
+    passing, inner2 = np.empty((axes.shape[0], rays.shape[0]), dtype=np.bool_), inscribed_square(blades)
     for k in range(rays.shape[0]):
         # the same of both halves
         alive = passes(rays, k, iris_radius)
         for half in range(axes.shape[0]):
-            passing[half, k] = alive and _lands(rays, k, radius, blades, axes[half], places[half], width, height)
+            passing[half, k] = alive and _lands(rays, k, inner2, blades, axes[half], places[half], width, height)
     chosen = _choose(pupil, triangles, every, passing, count)
     for k in range(chosen.size):
         chosen[k] %= rays.shape[0]
