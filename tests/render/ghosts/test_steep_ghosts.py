@@ -138,14 +138,14 @@ def test_light_at_the_ends_of_the_spectrum_is_found_around_that_between(lens, f_
 
 
 def test_a_curve_is_computed_where_it_bends():
-    """Light that begins like a square root, and a smooth curve: both within the told part of the largest value."""
+    """Light that begins like a square root, and a smooth curve: both within a part of the largest value."""
     asked: list[int] = []
 
-    def begun(w: int) -> float:
+    def root(w: int) -> float:
         asked.append(w)
         return float(np.sqrt(max(FINE_NM[w] - 500.0, 0.0)))
 
-    found = interpolated_where_straight(FINE_NM, begun, 5e-3)
+    found = interpolated_where_straight(FINE_NM, root, 5e-3)
     exact = np.sqrt(np.maximum(FINE_NM - 500.0, 0.0))
     assert np.abs(found - exact).max() < 5e-3 * exact.max()
     # every other, and those beside the beginning
@@ -158,7 +158,7 @@ def test_a_curve_is_computed_where_it_bends():
     # the remainder of a cubic, largest at 720 nm between 630, 690, 755 and 800 nm
     assert np.abs(sine - 1.0 - np.sin(FINE_NM / 80.0)).max() < 90.0 * 30.0 * 35.0 * 80.0 / 24.0 / 80.0**4
     asked.clear()
-    assert (interpolated_where_straight(FINE_NM, begun, -1.0) == exact).all()
+    assert (interpolated_where_straight(FINE_NM, root, -1.0) == exact).all()
     assert asked == [*range(22)]
 
 

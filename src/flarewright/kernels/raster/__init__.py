@@ -2,8 +2,8 @@
 
 - `bundle`: `draw_bundle`, `measure_bundle`, `node_densities` of a traced bundle
 - `polygons`: convex polygons in blocks of pixels: `blank_plane`, `fill_polygon`, `to_pixels`, `sum_rows`
-- `plane_memory`: `black_memory`, `black_picture` and `black_differences`, zeros in pages of their own for large planes
-  and pictures
+- `plane_memory`: memory of large planes and pictures in pages of their own: `black_memory`, `black_picture`,
+  `unset_picture`, `black_differences`
 - `iris_mask`: polygons multiplied by an iris image
 - `stop_pattern`: patterns in the stop plane and their look-up, pixel by pixel: `weave`
 - `spread`: `spread_taps`, convolution of a picture with a small kernel

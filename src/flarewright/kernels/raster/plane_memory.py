@@ -68,8 +68,8 @@ def unset_picture(width: int, height: int) -> NDArray[np.float32]:
 
     Parameters
     ----------
-    width, height : int
-        Number of columns and of rows.
+    width, height
+        As in `black_picture`.
 
     Returns
     -------
@@ -83,8 +83,8 @@ def black_differences(width: int, height: int) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    width, height : int
-        Number of columns and of rows.
+    width, height
+        As in `black_picture`.
 
     Returns
     -------

@@ -4,8 +4,8 @@ import numpy as np
 
 from ..jit.decorators import borrowing, compiled
 from .clip import inscribed_square
-from .representative_rays import lands_at, passes, within_blades
-from .sequential import ALIVE, REL, WEIGHT, X, Y
+from .representative_rays import is_seen, passes
+from .sequential import ALIVE, REL, WEIGHT
 
 # rounding error of a sum of weights that is 1
 _ROUNDING = 1e-9
@@ -98,10 +98,8 @@ def visible_areas(traced, shares, nearest, pupil, triangles, iris_radius, blades
             if not passes(ray, 0, iris_radius):
                 continue
             for half in range(axes.shape[0]):
-                if within_blades(ray, 0, inner2, blades, axes[half]):
-                    column, row = lands_at(places[half], ray[0, X], ray[0, Y])
-                    if 0.0 <= column < width and 0.0 <= row < height:
-                        areas[m] += own[k]
+                if is_seen(ray, 0, inner2, blades, axes[half], places[half], width, height):
+                    areas[m] += own[k]
     return areas
 
 

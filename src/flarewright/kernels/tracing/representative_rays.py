@@ -73,13 +73,16 @@ def seen_rays(rays, iris_radius, blades, axes, place, width, height):
     """
     seen, inner2 = np.empty(rays.shape[0], dtype=np.bool_), inscribed_square(blades)
     for k in range(rays.shape[0]):
-        seen[k] = passes(rays, k, iris_radius) and _lands(rays, k, inner2, blades, axes, place, width, height)
+        seen[k] = passes(rays, k, iris_radius) and is_seen(rays, k, inner2, blades, axes, place, width, height)
     return seen
 
 
 @borrowing
-def _lands(rays, k, inner2, blades, axes, place, width, height):
-    """Return whether a ray that passes all rims passes the blades and lands in the picture, as in `seen_rays`."""
+def is_seen(rays, k, inner2, blades, axes, place, width, height):
+    """Return whether a ray that passes all rims passes the blades and lands in the picture, as in `seen_rays`.
+
+    `inner2` as in `within_blades`.
+    """
     if not within_blades(rays, k, inner2, blades, axes):
         return False
     column, row = lands_at(place, rays[k, X], rays[k, Y])
@@ -109,7 +112,7 @@ def choose_seen(rays, pupil, triangles, every, iris_radius, blades, axes, places
         # the same of both halves
         alive = passes(rays, k, iris_radius)
         for half in range(axes.shape[0]):
-            passing[half, k] = alive and _lands(rays, k, inner2, blades, axes[half], places[half], width, height)
+            passing[half, k] = alive and is_seen(rays, k, inner2, blades, axes[half], places[half], width, height)
     chosen = _choose(pupil, triangles, every, passing, count)
     for k in range(chosen.size):
         chosen[k] %= rays.shape[0]

@@ -208,7 +208,7 @@ def find_region(
     # of a light far beside this one, the region can lie outside the front
     if beside is not None and around is not None and _area(around) > 0.0:
         found, sums, _ = _scan(packed, middle, around, cells_across(packed, FINER), finest, None, 1)
-        if sums[4] >= SMALL_REGION and not ((found == around) & (around != front)).any():
+        if sums[4] >= SMALL_REGION and not _may_go_beyond(found, around, front):
             return _region(found, sums, beside.slivers)
     first, cells = _looked_at(packed, front, within, quick)
     box = first
@@ -299,10 +299,15 @@ def region_at_ends(
     for w in wavelengths_fitted(packed)[1:]:
         arguments = (*_looking_arguments(packed, w, path, tilt), path.stop_crossings, iris_radius, view_radius)
         found, sums, _ = _scan(packed, arguments, around, cells, finest, slivers=slivers)
-        if sums[4] < BLOB or ((found == around) & (around != front)).any():
+        if sums[4] < BLOB or _may_go_beyond(found, around, front):
             return None
         box = join_boxes(box, found)
     return replace(known, box=box, share=known.share * _area(known.box) / _area(box))
+
+
+def _may_go_beyond(found: Floats, around: Floats, front: Floats) -> bool:
+    """Return whether light that a scan found in a box comes to a side of it that is not one of the front."""
+    return bool(((found == around) & (around != front)).any())
 
 
 def _looked_at(packed: PackedLens, front: Floats, within: Floats | None, quick: bool) -> tuple[Floats, tuple[int, int]]:

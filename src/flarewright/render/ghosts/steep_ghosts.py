@@ -233,7 +233,7 @@ def _rays(shot: Shot, fine: Shot, bundle: Bundle) -> tuple[Callable[[int], Float
     """
     assert shot.between is not None
     fine_nm, tilt, is_lines = fine.packed.wavelengths_nm, shot.incidence.tilt, shot.between.lines_nm is not None
-    # the last gap takes in what is left
+    # the last gap may be longer
     few = np.unique(np.append(np.arange(0, len(fine_nm) - RAY_STRIDE, RAY_STRIDE), len(fine_nm) - 1))
 
     @cache

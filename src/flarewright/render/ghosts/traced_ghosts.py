@@ -210,7 +210,7 @@ def draw_final(
     spectrum = traced_spectrum(shot, path, bundle, item.in_picture)
     steep = "not" if few else steepness(shot, bundle, spectrum, item.in_picture)
     if steep != "not":
-        other = _seen_by(at_fine_wavelengths(shot), item, anew=steep == "much")
+        other = _seen_by(at_fine_wavelengths(shot), item, nearby=steep == "little")
         if steep == "much":
             watch.lap("colour")
             draw_final(replace(other, least_steps=2), quality, canvas, visibility, stop, around, detail, costs)
@@ -287,10 +287,10 @@ def _draw_in_all(
             watch.drew(whole, data, shot.incidence.axes, place, canvas.size(detail))
 
 
-def _seen_by(shot: Shot, item: FinalPass, *, anew: bool) -> FinalPass:
-    """Search the accepted pupil of an item at the wavelengths of another shot; not `anew`: around the known one."""
+def _seen_by(shot: Shot, item: FinalPass, *, nearby: bool) -> FinalPass:
+    """Search the accepted pupil of an item at the wavelengths of another shot; `nearby`: first around the known one."""
     search = (shot.packed, item.path, shot.incidence.tilt, shot.opening.radius, item.view_radius)
-    found = (None if anew else region_at_ends(*search, item.region)) or find_region(*search)
+    found = (region_at_ends(*search, item.region) if nearby else None) or find_region(*search)
     orders = item.orders
     if orders and shot.grating is not None and item.path.second_reflection is not None:
         orders = grating_orders(shot.packed, item.path.second_reflection, shot.grating)
