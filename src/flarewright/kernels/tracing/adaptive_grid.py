@@ -41,10 +41,11 @@ FAR_RAYS, FAR_RADII, FAR_LEVEL = 3, 2.0, 2
 
 
 @borrowing
-def _classify(data, nodes, crossings, iris, level, h, limits, values):
+def _classify(data, nodes, crossings, iris, level, h, limits, light, values):
     """Classify a cell of 3 x 3 nodes as EMPTY, LEAF, FLAT or SPLIT with its reason; `values`, shape (9,), is scratch.
 
-    The triangle fan of a LEAF uses the midpoints of its edges, which leaves a quarter of the measured error.
+    `light` is what passes the centre of the cell on average over the wavelengths. The triangle fan of a LEAF uses the
+    midpoints of its edges, which leaves a quarter of the measured error.
     """
     iris_radius, iris_inner = iris
     tolerance, fringe_tolerance, scale, view_radius = (
@@ -125,8 +126,9 @@ def _classify(data, nodes, crossings, iris, level, h, limits, values):
         if extent > limits.area_px:
             ratio = max(abs(area_low), abs(area_high)) / max(min(abs(area_low), abs(area_high)), 1e-300)
             error, reason = _worse(error, reason, 4.0 * (ratio - 1.0) / limits.area_ratio, AREA_BEND)
-    # errors in flux count for cells of any size
-    bend = _bend(data, nodes, np.int64(WEIGHT)) / (limits.weight_bend * abs(data[nodes[4], WEIGHT]) + 1e-300)
+    # errors in flux count for cells of any size; those of a dark wavelength are invisible beside the light of the others
+    allowed = limits.weight_bend * max(abs(data[nodes[4], WEIGHT]), light) + 1e-300
+    bend = _bend(data, nodes, np.int64(WEIGHT)) / allowed
     error, reason = _worse(error, reason, bend, WEIGHT_BEND)
     if error > 4.0:
         return _split(reason)
@@ -216,6 +218,16 @@ def _may_hide_gap(data, nodes, crossings, iris_radius, view_radius, values):
         y_low, y_high = min(y_low, data[k, Y]), max(y_high, data[k, Y])
     out_x, out_y = max(max(x_low, -x_high), 0.0), max(max(y_low, -y_high), 0.0)
     return out_x * out_x + out_y * out_y <= view_radius * view_radius
+
+
+@borrowing
+def _mean_weight(data, node):
+    """Return the weight of a node's rays averaged over the wavelengths; a ray that ends has none."""
+    total = 0.0
+    for v in range(data.shape[0]):
+        if data[v, node, ALIVE] > 0.0:
+            total += abs(data[v, node, WEIGHT])
+    return total / data.shape[0]
 
 
 @borrowing
@@ -343,9 +355,10 @@ def build_mesh(steps, lens, light, crossings, iris, box, coarse, limits):
             for cell in cells:
                 a, b = cell // height, cell % height
                 _cell_nodes(lattice, a, b, level, depth, nodes)
+                passing = _mean_weight(data, nodes[4])
                 verdict = EMPTY
                 for v in range(data.shape[0]):
-                    found = _classify(data[v], nodes, crossings, iris, level, h, limits, values)
+                    found = _classify(data[v], nodes, crossings, iris, level, h, limits, passing, values)
                     if found % REASON == SPLIT:
                         verdict = SPLIT
                         halved[found // REASON] += 1

@@ -15,7 +15,7 @@ from .shot import Shot
 # in a uniform picture, the 99th percentile is less than this many times the median
 UNIFORM_RATIO = 1.5
 # rows or columns, whichever are fewer, that percentiles are taken from
-_SAMPLED_ROWS = 64
+_SAMPLED_ROWS = 32
 # largest number of lights listed separately
 MOST_LISTED = 3
 
