@@ -126,7 +126,7 @@ def _classify(data, nodes, crossings, iris, level, h, limits, light, values):
         if extent > limits.area_px:
             ratio = max(abs(area_low), abs(area_high)) / max(min(abs(area_low), abs(area_high)), 1e-300)
             error, reason = _worse(error, reason, 4.0 * (ratio - 1.0) / limits.area_ratio, AREA_BEND)
-    # errors in flux count for cells of any size; those of a dark wavelength are invisible beside the light of the others
+    # errors in flux count for cells of any size; those of a dark wavelength are invisible beside the light of others
     allowed = limits.weight_bend * max(abs(data[nodes[4], WEIGHT]), light) + 1e-300
     bend = _bend(data, nodes, np.int64(WEIGHT)) / allowed
     error, reason = _worse(error, reason, bend, WEIGHT_BEND)

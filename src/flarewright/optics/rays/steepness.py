@@ -51,11 +51,13 @@ def interpolation_error(
     drawn = (True,) * len(known_nm) if traced is None else tuple(traced.tolist())
     straight, bent = _interpolations(tuple(known_nm), drawn)
     # all light, also of a line between two of these wavelengths
-    passed, light = passed[..., ::EVERY], curve_hats(tuple(CURVE_NM[::EVERY])) @ light
+    passed = passed[..., ::EVERY]
+    # in rows, along which sums are vectorised
+    by_channel = np.ascontiguousarray((curve_hats(tuple(CURVE_NM[::EVERY])) @ light).T)
     # not `@`, whose library threads busy-wait next to ours
     line = np.einsum("...w,wl->...l", throughput, straight)
     more = np.maximum(np.einsum("...w,wl->...l", throughput, bent), 0.0) - line
-    error, total = (np.abs(np.einsum("...l,lc->...c", one * passed, light)).max(axis=-1) for one in (more, line))
+    error, total = (np.abs(np.einsum("...l,cl->...c", one * passed, by_channel)).max(axis=-1) for one in (more, line))
     return error, total
 
 

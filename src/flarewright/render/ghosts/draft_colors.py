@@ -285,21 +285,22 @@ def _transmitted(paths: Sequence[LightPath], angles: Floats) -> Floats:
     of other colours are closer to it is a part of their throughput.
     """
     squares: Floats = angles[len(angles) // 2].copy()
-    most, starts = _largest(paths, REFRACT, angles), joined_steps(tuple(paths))[2]
-    least = most.argmin(axis=0)
-    for p in np.flatnonzero(most[len(angles) // 2] > CRITICAL).tolist():
-        squares[starts[p] : starts[p + 1]] = angles[least[p], starts[p] : starts[p + 1]]
+    _, actions, starts = joined_steps(tuple(paths))
+    # few paths are near total reflection
+    for p in np.flatnonzero(_largest(paths, REFRACT, squares) > CRITICAL).tolist():
+        own = slice(starts[p], starts[p + 1])
+        farthest = np.where(actions[own] == REFRACT, angles[:, own], 0.0).max(axis=1).argmin()
+        squares[own] = angles[farthest, own]
     return squares
 
 
 def _nearly_total(paths: Sequence[LightPath], angles: Floats) -> Mask:
     """Return which paths have a mirror near total reflection, where R is no parabola in the angle; (W, steps)."""
-    below = np.where(angles < 1.0, angles, 0.0)
-    near: Mask = _largest(paths, REFLECT, below).max(axis=0) > CRITICAL
+    near: Mask = _largest(paths, REFLECT, np.where(angles < 1.0, angles, 0.0).max(axis=0)) > CRITICAL
     return near
 
 
 def _largest(paths: Sequence[LightPath], action: int, angles: Floats) -> Floats:
-    """Return the largest of the angles, (W, steps), at which each path is refracted or reflected, (W, P)."""
+    """Return the largest of the angles, (steps,), at which each path is refracted or reflected, (P,)."""
     _, actions, starts = joined_steps(tuple(paths))
-    return np.maximum.reduceat(np.where(actions == action, angles, 0.0), starts[:-1], axis=1)
+    return np.maximum.reduceat(np.where(actions == action, angles, 0.0), starts[:-1])

@@ -35,7 +35,9 @@ CROWDED_GHOSTS = 200
 
 def draw_drafts(work: GhostWork) -> GhostPass:
     """Draw the ghosts of a picture from paraxial matrices."""
-    shots, paths, art = work.shots, work.paths, work.art
+    # converting the sum to irradiance would take a twentieth of a draft
+    shots = [replace(shot, scale=1.0 / shot.pixel_area) for shot in work.shots]
+    paths, art = work.paths, work.art
     points, wide = ([s for s in shots if (s.border is None) == point] for point in (True, False))
     order, known = list(range(len(paths))), None
     if work.singles != 0 and paths:
@@ -43,7 +45,9 @@ def draw_drafts(work: GhostWork) -> GhostPass:
         known = [of_shot for shot, of_shot in zip(shots, colors, strict=True) if shot.border is None]
     drawing = _drawing(work, points, wide, order, known)
     named = [paths[k] for k in order]
-    total, layers = sum_ghosts(work, order, named, partial(_draw_group, drawing), most_chunks=_MOST_CHUNKS)
+    total, layers = sum_ghosts(
+        work, order, named, partial(_draw_group, drawing), most_chunks=_MOST_CHUNKS, is_irradiance=True
+    )
     return GhostPass(total, layers, len(paths), None, 0, 0.0, 0)
 
 

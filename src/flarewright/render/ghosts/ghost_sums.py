@@ -139,13 +139,15 @@ def sum_ghosts(
     jobs: Sequence[Callable[[], Drawn]] = (),
     ghosts_each: int = 1,
     most_chunks: int = MOST_CHUNKS,
+    is_irradiance: bool = False,
 ) -> tuple[Layer, tuple[Layer, ...]]:
     """Draw the first items separately, the others in a fixed number of groups, then run `jobs`; add in this order.
 
-    Each item stands for `ghosts_each` ghosts. The first `work.layers` of the separate ones become layers.
+    Each item stands for `ghosts_each` ghosts. The first `work.layers` of the separate ones become layers. What is drawn
+    is flux per pixel unless `is_irradiance`.
     """
     shot, pool = work.shots[0], work.pool
-    pixel_area = 1.0 / float(shot.to_pixels[2] * shot.to_pixels[3])
+    divisor = 1.0 if is_irradiance else shot.pixel_area
     luminance = luminance_weights(shot.colorspace)
     alone = len(work.alone(items))
     kept_layers = alone if work.layers is None else min(work.layers, alone)
@@ -160,7 +162,7 @@ def sum_ghosts(
         pixels, (left, top) = patch.pixels, patch.corner
         if work.ranking is not None:
             x0, y0, x1, y1 = lit_window(pixels)
-            light = luminance_of(pixels[y0:y1, x0:x1], shot.colorspace) / np.float32(pixel_area)
+            light = luminance_of(pixels[y0:y1, x0:x1], shot.colorspace) / np.float32(divisor)
             work.ranking.add(path.name, light, (left + x0, top + y0, x1 - x0, y1 - y0))
         if k >= kept_layers:
             totals = _added(totals, drawn, shot.size_px)
@@ -168,11 +170,11 @@ def sum_ghosts(
         about: dict[str, str | float] = {
             "path": path.name,
             # sum down the columns first: along a row the three channels alternate
-            "flux_mm2": float(luminance @ pixels.sum(axis=0, dtype=np.float64).sum(axis=0)),
+            "flux_mm2": float(luminance @ pixels.sum(axis=0, dtype=np.float64).sum(axis=0)) * shot.pixel_area / divisor,
         }
         if path.name in work.art:
             about["art"] = work.art[path.name].text()
-        layers.append(to_layer(f"ghost.{path.name}", patch, pixel_area, about))
+        layers.append(to_layer(f"ghost.{path.name}", patch, divisor, about))
         held += layers[-1].pixels.nbytes
         check_memory(held, spare)
         # the layer holds a copy, so the planes can be added in place
@@ -183,7 +185,7 @@ def sum_ghosts(
     for drawn in pool.map(lambda job: job(), jobs):
         totals = _added(totals, drawn, shot.size_px)
     total = merge(totals, shot.size_px)
-    return to_layer("ghosts", Patch(total), pixel_area, {}, reuse=True), tuple(layers)
+    return to_layer("ghosts", Patch(total), divisor, {}, reuse=True), tuple(layers)
 
 
 def _in_turn(

@@ -128,17 +128,15 @@ def blank(size_px: tuple[int, int]) -> Canvas:
     return Canvas(size_px, [None] * DETAILS)
 
 
-def to_layer(
-    name: str, patch: Patch, pixel_area: float, about: dict[str, str | float], *, reuse: bool = False
-) -> Layer:
-    """Crop a picture to its lit window and convert flux to irradiance.
+def to_layer(name: str, patch: Patch, divisor: float, about: dict[str, str | float], *, reuse: bool = False) -> Layer:
+    """Crop a picture to its lit window and convert it to irradiance.
 
     Parameters
     ----------
     name : str
     patch : Patch
-    pixel_area : float
-        mm^2.
+    divisor : float
+        Of flux per pixel the area of a pixel, mm^2; of irradiance 1.
     about : dict
     reuse : bool
         Allow the layer to take over the memory of the patch.
@@ -153,20 +151,23 @@ def to_layer(
     if x1 <= x0:
         return Layer(name, np.zeros((1, 1, 3), dtype=np.float32), (0, 0, 1, 1), about)
     shape = (y1 - y0, x1 - x0, 3)
-    irradiance = np.empty(shape, dtype=np.float32)
-    if reuse and pixels.shape == shape and pixels.dtype == np.float32:
-        irradiance = pixels.astype(np.float32, copy=False)
-    np.multiply(pixels[y0:y1, x0:x1], 1.0 / pixel_area, out=irradiance, casting="same_kind")
+    reused = reuse and pixels.shape == shape and pixels.dtype == np.float32
+    irradiance = pixels.astype(np.float32, copy=False) if reused else np.empty(shape, dtype=np.float32)
+    if divisor != 1.0 or not reused:
+        np.multiply(pixels[y0:y1, x0:x1], 1.0 / divisor, out=irradiance, casting="same_kind")
     return Layer(name, irradiance, (left + x0, top + y0, x1 - x0, y1 - y0), about)
 
 
 def lit_window(pixels: Plane) -> tuple[int, int, int, int]:
     """Return the bounds x0, y0, x1, y1 of the light in a picture of shape (H, W, 3); all 0 if it is black."""
+    # most pictures are lit everywhere
+    if pixels.size > 0 and all(side.any() for side in (pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1])):
+        return 0, 0, pixels.shape[1], len(pixels)
     starts = range(0, len(pixels), _STRIP)
     first = next((start for start in starts if pixels[start : start + _STRIP].any()), None)
     if first is None:
         return 0, 0, 0, 0
-    # search from both ends: most pictures are lit everywhere, so this reads only a few rows
+    # search from both ends, which reads only a few rows
     last = next(start for start in reversed(starts) if pixels[start : start + _STRIP].any())
     rows = [start + np.flatnonzero(_lit(pixels[start : start + _STRIP], 1)) for start in (first, last)]
     y0, y1 = int(rows[0][0]), int(rows[1][-1]) + 1

@@ -284,7 +284,7 @@ def _finish(
 ) -> ReferencePass:
     shot = shots[0]
     # rays carry the part that the sensor absorbs; the picture is the light that arrives at the sensor
-    area = kept / float(shot.to_pixels[2] * shot.to_pixels[3])
+    area = kept * shot.pixel_area
     mean, variance = sums.mean("planes") / area, sums.variance("planes") / area**2
     names = (ORDER_2, ORDER_4, SCATTER)[: len(mean)]
     ledger = ledger_of(sums)

@@ -78,6 +78,8 @@ class Shot:
     dense : bool
         Whether the wavelengths sample all visible light (`optics.colour.spectrum.sampled_wavelengths`), so that colours
         are interpolated cubically.
+    scale : float
+        Factor on the light that is drawn: 1 for flux per pixel, the inverse of the pixel area for irradiance.
     """
 
     light: Light
@@ -95,11 +97,17 @@ class Shot:
     curves: BandCurves | None = None
     between: Between | None = None
     dense: bool = False
+    scale: float = 1.0
 
     @property
     def gain(self) -> float:
-        """Irradiance at the plane of the first vertex."""
-        return self.light.intensity * self.incidence.cosine
+        """Irradiance at the plane of the first vertex, times `scale`."""
+        return self.light.intensity * self.incidence.cosine * self.scale
+
+    @property
+    def pixel_area(self) -> float:
+        """Area of a pixel, mm^2."""
+        return 1.0 / float(self.to_pixels[2] * self.to_pixels[3])
 
     @property
     def working_f_number(self) -> float:
