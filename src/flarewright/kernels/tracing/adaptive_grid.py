@@ -41,11 +41,11 @@ FAR_RAYS, FAR_RADII, FAR_LEVEL = 3, 2.0, 2
 
 
 @borrowing
-def _classify(data, nodes, crossings, iris, level, h, limits, light, values):
+def _classify(data, nodes, crossings, iris, level, h, limits, passing, values):
     """Classify a cell of 3 x 3 nodes as EMPTY, LEAF, FLAT or SPLIT with its reason; `values`, shape (9,), is scratch.
 
-    `light` is what passes the centre of the cell on average over the wavelengths. The triangle fan of a LEAF uses the
-    midpoints of its edges, which leaves a quarter of the measured error.
+    `passing` is the weight at the centre of the cell, averaged over the wavelengths. The triangle fan of a LEAF uses
+    the midpoints of its edges, which leaves a quarter of the measured error.
     """
     iris_radius, iris_inner = iris
     tolerance, fringe_tolerance, scale, view_radius = (
@@ -127,7 +127,7 @@ def _classify(data, nodes, crossings, iris, level, h, limits, light, values):
             ratio = max(abs(area_low), abs(area_high)) / max(min(abs(area_low), abs(area_high)), 1e-300)
             error, reason = _worse(error, reason, 4.0 * (ratio - 1.0) / limits.area_ratio, AREA_BEND)
     # errors in flux count for cells of any size; those of a dark wavelength are invisible beside the light of others
-    allowed = limits.weight_bend * max(abs(data[nodes[4], WEIGHT]), light) + 1e-300
+    allowed = limits.weight_bend * max(abs(data[nodes[4], WEIGHT]), passing) + 1e-300
     bend = _bend(data, nodes, np.int64(WEIGHT)) / allowed
     error, reason = _worse(error, reason, bend, WEIGHT_BEND)
     if error > 4.0:
