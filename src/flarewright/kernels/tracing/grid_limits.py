@@ -35,7 +35,8 @@ class GridLimits(NamedTuple):
     area_ratio : float
         Largest ratio of the areas of a cell's triangles on the sensor, less 1: the spread of its density.
     weight_bend : float
-        Light is interpolated linearly between nodes: largest departure from that, as a part of the light.
+        Light is interpolated linearly between nodes: largest departure from that, as a part of the light of its
+        wavelength, or of the mean over all wavelengths where that is more.
     fold_px, area_px : float
         Cells whose image is smaller, pixels, may fold, and may have any ratio of areas.
     """

@@ -43,7 +43,7 @@ def draft_alone(
     Returns
     -------
     ndarray, shape (H, W, 3)
-        Flux per pixel.
+        Flux per pixel times `Shot.scale`.
     """
     shot, first = ghosts[0][0], art[0]
     detail = max(halved, coarseness(first, shot.to_pixels) if first.blur > 0.0 else 0)
@@ -79,7 +79,7 @@ def mark_spread(
         As in `draft_alone`, without ramps and blurs.
     pyramid : list of ndarray or None
         One per resolution; missing ones are created. Two calls of `kernels.raster.polygons.sum_rows` turn them into
-        flux per pixel.
+        the light of `draft_alone`.
     scratch : ndarray of float64, optional
         Zeros returned by the previous call, reused if large enough.
 
@@ -111,7 +111,7 @@ def mark_spread(
 
 
 def spread_light(marks: Floats) -> Floats:
-    """Turn a picture marked by `mark_spread` into flux per pixel, in place."""
+    """Turn a picture marked by `mark_spread` into light, in place."""
     sum_rows(marks, marks)
     sum_rows(marks, marks)
     # remove rounding errors of the sums
